@@ -1,0 +1,103 @@
+"""The two conductors: a photo becomes a Drawing, a Drawing becomes a picture."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from stroke_gen import params
+from stroke_gen.drawing import Drawing, Stroke
+from stroke_gen.generate import generate
+
+from . import calibration, optics, paper, rub
+from .palette import Palette, load_palette
+from .settings import Settings
+from .wax import Sheet
+
+Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
+
+
+@dataclass
+class Easel:
+    """An open sheet with its paper and crayons: strokes go on, pictures come off."""
+
+    sheet: Sheet
+    box: rub.Box
+    ground: tuple[float, float, float]
+    threads: int
+    smears: bool = True
+
+    def draw(self, strokes: Sequence[Stroke], progress: rub.Progress | None = None) -> None:
+        """Draw strokes, in order, onto what is there."""
+        rub.rub(self.sheet, strokes, self.box, threads=self.threads, smears=self.smears, progress=progress)
+
+    def picture(self, light: bool = True) -> NDArray[np.float32]:
+        """The sheet as linear RGB (rows, cols, 3)."""
+        return optics.render(self.sheet, self.ground, light=light, threads=self.threads)
+
+
+def easel(drawing: Drawing, size: int, threads: int | None = None, smears: bool = True) -> Easel:
+    """A blank sheet for a drawing, `size` cells along its long side."""
+    palette = load_palette(drawing.palette)
+    sheet_paper = paper.load_paper(drawing.paper)
+    cell_mm = max(drawing.width_mm, drawing.height_mm) / size
+    rows, cols = max(1, round(drawing.height_mm / cell_mm)), max(1, round(drawing.width_mm / cell_mm))
+    tooth = paper.tooth(sheet_paper, rows, cols, cell_mm, drawing.seed)
+    sheet = Sheet(tooth, cell_mm, *_optics(palette))
+    box = rub.Box(palette, rub.physics(drawing.physics), cell_mm, drawing.seed)
+    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or os.cpu_count() or 1, smears)
+
+
+def _optics(palette: Palette) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """k and s of all crayons, (crayons, 3) each."""
+    k = np.array([c.k for c in palette.crayons], np.float32)
+    return k, np.array([c.s for c in palette.crayons], np.float32)
+
+
+def draw(
+    drawing: Drawing,
+    size: int = Settings.size,
+    *,
+    threads: int | None = None,
+    preview: bool = False,
+    light: bool = True,
+    progress: Progress | None = None,
+) -> Easel:
+    """A drawing on paper, `size` cells along the long side; `.picture()` shows it.
+
+    preview: without smearing and at half the size (section 5 of the paper).
+    """
+    stand = easel(drawing, max(1, size // 2) if preview else size, threads, smears=not preview)
+    stand.draw(drawing.strokes, progress and (lambda done, all_: progress("drawing", done / all_)))
+    return stand
+
+
+def sketch(photo: NDArray[np.float32], settings: Settings, progress: Progress | None = None) -> tuple[Drawing, Easel]:
+    """Plan and draw a photo in linear light (h, w, 3): its Drawing and the sheet it was drawn on."""
+    long_mm = settings.sheet_mm
+    scale = long_mm / max(photo.shape[:2])
+    width_mm, height_mm = photo.shape[1] * scale, photo.shape[0] * scale
+    style = params.with_force(params.load_style(settings.style), settings.force)
+    blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
+    stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
+                  smears=not settings.preview)  # fmt: skip
+    table = calibration.swatches(stand.box.palette, paper.load_paper(settings.paper), settings.physics, stand.threads)
+    stages = len(style.passes) + 1
+    done = 0
+
+    def observe(strokes: list[Stroke], shape: tuple[int, int]) -> NDArray[np.float32]:
+        nonlocal done
+        if strokes:
+            base = done / stages
+            name = strokes[0].note
+            stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)))
+        done += 1
+        return cv2.resize(stand.picture(light=False), shape[::-1], interpolation=cv2.INTER_AREA)
+
+    strokes = generate(photo, width_mm, height_mm, table, style, settings.seed, observe=observe,
+                       threads=stand.threads, focus=settings.focus)  # fmt: skip
+    drawing = Drawing(width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed)
+    return drawing, stand

@@ -1,0 +1,145 @@
+"""Strokes onto a sheet: from a Drawing's millimetres to the wax kernels, on all threads.
+
+Wear carries on within a stroke cell by cell. From stroke to stroke it carries on as a plan: the volume
+that a stroke rubs off follows from its force and length (rate * force / lambda, see `worn_per_newton_mm`),
+so each stroke's tip is known before any is drawn, and strokes on different tiles can be drawn side by
+side. A tip worn flat is turned or sharpened: the next stroke gets a fresh mask.
+"""
+
+import functools
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stroke_gen.drawing import Stroke, Tip
+
+from . import schedule, tip
+from .palette import Palette
+from .wax import Physics, Sheet, _rub
+
+STEP = 0.2  # of the tip's width, between two contacts
+SHARPEN_UM = 36.0  # mean height lost before a tip is turned or sharpened
+WEAR_LEVELS = 4  # masks between sharp and worn
+FACES = 8  # different sets of bumps
+
+Progress = Callable[[int, int], None]
+
+
+@functools.cache
+def physics(name: str) -> Physics:
+    """The constants of a physics preset."""
+    table = tomllib.loads(resources.files("crayonize").joinpath("data/physics.toml").read_text("utf-8"))
+    if name not in table:
+        raise ValueError(f"physics: {name!r} is none of {', '.join(table)}")
+    return Physics(**table[name])
+
+
+class Box:
+    """The crayons in hand: how far each tip is worn, which face of it touches, how much wax it gave."""
+
+    def __init__(self, palette: Palette, constants: Physics, cell_mm: float, seed: int = 0) -> None:
+        self.palette, self.constants, self.cell_mm, self.seed = palette, constants, cell_mm, seed
+        self.worn_um: dict[tuple[str, Tip], float] = {}
+        self.given_mm3: dict[str, float] = {}
+        self._index: dict[tuple[Tip, int, int], int] = {}
+        self.masks: list[NDArray[np.float32]] = []
+
+    def take(self, stroke: Stroke, newton_mm: float) -> int:
+        """Which of `masks` draws this stroke; carries the crayon's wear on by force times length."""
+        key = (stroke.crayon, stroke.tip)
+        worn = self.worn_um.get(key, 0.0)
+        area_mm2 = 0.785 * stroke.tip.width_mm**2
+        self.worn_um[key] = worn + worn_per_newton_mm(self.constants) * newton_mm / area_mm2
+        face, rest = divmod(worn, SHARPEN_UM)
+        shape = (stroke.tip, (int(face) + len(stroke.crayon)) % FACES, int(rest / SHARPEN_UM * WEAR_LEVELS))
+        if shape not in self._index:
+            self._index[shape] = len(self.masks)
+            self.masks.append(self._mask(*shape))
+        return self._index[shape]
+
+    def _mask(self, shape: Tip, face: int, level: int) -> NDArray[np.float32]:
+        rng = np.random.default_rng([self.seed, 11, face])
+        worn_um = level / WEAR_LEVELS * SHARPEN_UM
+        return np.pad(tip.mask(shape, self.cell_mm, worn_um, rng), 1, constant_values=tip.ABSENT)
+
+    def stacked(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """All masks as rows of one array, and the side of each."""
+        sides = np.array([m.shape[0] for m in self.masks], np.int64)
+        rows = np.full((len(sides), int(sides.max()) ** 2), tip.ABSENT, np.float32)
+        for row, m in zip(rows, self.masks, strict=True):
+            row[: m.size] = m.ravel()
+        return rows, sides
+
+
+def worn_per_newton_mm(constants: Physics) -> float:
+    """Wax worn off a tip's relief in um mm^2 per newton and mm of path: rate * mu * sin / lambda, at usual means."""
+    return constants.wear * constants.rate_per_mm * 0.7 / constants.lam
+
+
+def rub(
+    sheet: Sheet,
+    strokes: Sequence[Stroke],
+    box: Box,
+    *,
+    threads: int = 1,
+    smears: bool = True,
+    progress: Progress | None = None,
+) -> float:
+    """Draw strokes on a sheet in order; returns the wax the crayons gave, in um times cells."""
+    if not strokes:
+        return 0.0
+    points, first = _points(strokes, sheet.cell_mm)
+    forces, cells = _work(points, first)
+    wax_of = np.array([box.palette.index(s.crayon) for s in strokes], np.int64)
+    mask_of = np.array([box.take(s, n * sheet.cell_mm) for s, n in zip(strokes, forces, strict=True)], np.int64)
+    masks, sides = box.stacked()
+    side_of = sides[mask_of]
+    level = schedule.levels(points, first, (side_of / 2 + 2).astype(np.float32), sheet.rows, sheet.cols)
+    cost = (cells / np.maximum(1, STEP * (side_of - 2)) + 1) * side_of**2
+    loss = np.zeros(len(strokes), np.float64)
+    constants = box.constants.constants(sheet.cell_mm)
+    per_lambda = np.float32(1 / (box.constants.lam * sheet.cell_mm**2))
+
+    def draw(picked: NDArray[np.int64]) -> None:
+        _rub(picked, points, first, wax_of, mask_of, masks, sides, np.float32(STEP), smears, constants, per_lambda,
+             sheet.rows, sheet.cols, *sheet.columns(), loss)  # fmt: skip
+
+    done = 0
+    with ThreadPoolExecutor(threads) as pool:
+        for members in _by_level(level):
+            list(pool.map(draw, schedule.shares(members, cost, threads)))
+            done += members.size
+            if progress:
+                progress(done, len(strokes))
+    for stroke, given in zip(strokes, loss * sheet.cell_mm**2 / 1000, strict=True):
+        box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + float(given)
+    return float(loss.sum())
+
+
+def _points(strokes: Sequence[Stroke], cell_mm: float) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """All points as (x, y in cells, force), and where each stroke begins."""
+    first = np.zeros(len(strokes) + 1, np.int64)
+    np.cumsum([len(s.path_mm) for s in strokes], out=first[1:])
+    points = np.empty((int(first[-1]), 3), np.float32)
+    np.concatenate([s.path_mm for s in strokes], out=points[:, :2])
+    points[:, :2] /= cell_mm
+    np.concatenate([s.force_n for s in strokes], out=points[:, 2])
+    return points, first
+
+
+def _work(points: NDArray[np.float32], first: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of each stroke: force times length (newton cells), and length in cells."""
+    step = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1])).astype(np.float64)
+    step[first[1:-1] - 1] = 0  # from one stroke to the next the crayon is lifted
+    step = np.append(step, 0.0)
+    return np.add.reduceat(step * points[:, 2], first[:-1]), np.add.reduceat(step, first[:-1])
+
+
+def _by_level(level: NDArray[np.int32]) -> Iterable[NDArray[np.int64]]:
+    """Strokes of each level, lowest first."""
+    order = np.argsort(level, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(level[order])) + 1)

@@ -1,0 +1,67 @@
+"""Crayon tips: 2D height masks that touch the paper (section 3.1 of the paper).
+
+A mask holds, on the sheet's cells, the distance in um from the tip's lowest point to its surface;
+cells that are no part of the tip hold `ABSENT`. Shapes are given in mm, so a tip looks the same at
+every resolution. A little smooth noise stands for the bumps and hollows of real wax: they draw the
+long streaks along a stroke.
+"""
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from stroke_gen.drawing import Tip
+
+ABSENT = np.float32(1e9)
+BUMP_UM = 16.0  # about a third of a drawing paper's tooth
+BUMP_MM = 0.32  # wavelength of the bumps
+SIDE_MM = 2.6  # breadth of the strip on which a lying crayon touches the paper
+DROPS_UM = {"sharp": 110.0, "blunt": 32.0, "rim": 60.0, "side": 40.0}  # centre to edge
+
+
+def mask(tip: "Tip", cell_mm: float, worn_um: float, rng: np.random.Generator) -> NDArray[np.float32]:
+    """The mask of a tip on a grid of `cell_mm`, after `worn_um` of its height has been rubbed off.
+
+    Returns (n, n) float32 in um with n odd, the lowest present cell at 0. Wear cuts the profile flat
+    from below, as drawing does.
+    """
+    if tip.kind not in DROPS_UM:
+        raise ValueError(f"tip.kind: {tip.kind!r} is none of {', '.join(DROPS_UM)}")
+    if not 0 < tip.width_mm <= 100:
+        raise ValueError(f"tip.width_mm: {tip.width_mm} is not between 0 and 100")
+    half = max(0.5 * tip.width_mm / cell_mm, 0.75)
+    n = 2 * int(np.ceil(half)) + 1
+    y, x = (np.mgrid[:n, :n] - n // 2) / half
+    angle = np.deg2rad(tip.angle_deg)
+    along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    radius = np.hypot(x, y)
+    rise, present = _profile(tip, along, across, radius)
+    height = DROPS_UM[tip.kind] * rise + BUMP_UM * _bumps(n, BUMP_MM / cell_mm, rng)
+    height = np.maximum(height, height[present].min() + worn_um)
+    height -= height[present].min()
+    return np.where(present, height, ABSENT).astype(np.float32)
+
+
+def _profile(
+    tip: "Tip", along: NDArray[np.float64], across: NDArray[np.float64], radius: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Height over the lowest point as a fraction of the drop, and which cells belong to the tip."""
+    if tip.kind == "sharp":
+        return radius**2, radius <= 1
+    if tip.kind == "blunt":
+        return radius**4, radius <= 1
+    if tip.kind == "rim":  # the worn back end: one side of a ring touches, the hollow stays above
+        return (radius - 0.75) ** 2 * 4 + 0.6 * (1 - along), (radius <= 1) & (radius > 0.35) & (along > -0.3)
+    breadth = max(SIDE_MM / tip.width_mm, 1e-3)
+    return (across / breadth) ** 2 * 4, (np.abs(across) <= breadth / 2) & (np.abs(along) <= 1)
+
+
+def _bumps(n: int, wavelength: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Smooth noise in [-1, 1] with the given wavelength in cells."""
+    noise = rng.standard_normal((n, n)).astype(np.float32)
+    sigma = max(0.3 * wavelength, 0.3)
+    smooth = cv2.GaussianBlur(noise, (0, 0), sigma, borderType=cv2.BORDER_WRAP if n > 64 else cv2.BORDER_REFLECT)
+    return np.clip(smooth / (2 * smooth.std() + 1e-9), -1, 1).astype(np.float64)

@@ -1,0 +1,129 @@
+"""Reading the photo: target colours, which way strokes run, where detail lies.
+
+All maps live on the work grid, a few cells to a crayon's width, whatever the size of photo and sheet.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .colour import from_oklab, oklab
+from .params import Style
+from .swatches import Swatches
+
+Floats = NDArray[np.float32]
+WORK_LONG = 640  # cells along the work grid's long side
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What the generator knows of a photo, on the work grid (h, w)."""
+
+    target: Floats  # (h, w, 3) linear colours the drawing should show from afar
+    lab: Floats  # (h, w, 3) the same as OKLab, chroma doubled
+    tangent: Floats  # (h, w, 2) unit vector along which strokes run, x then y
+    coherence: Floats  # (h, w) 0 no direction of its own .. 1 one clear direction
+    detail: Floats  # (h, w) 0 plain .. 1 eyes, lettering, edges
+    cell_mm: float
+
+
+def work_shape(width_mm: float, height_mm: float) -> tuple[int, int]:
+    """Rows and columns of the work grid."""
+    cell = max(width_mm, height_mm) / WORK_LONG
+    return max(2, round(height_mm / cell)), max(2, round(width_mm / cell))
+
+
+def fit(linear: Floats, shape: tuple[int, int]) -> Floats:
+    """Linear light resampled to `shape`: area mean when shrinking, smooth when enlarging."""
+    shrink = linear.shape[0] * linear.shape[1] >= shape[0] * shape[1]
+    method = cv2.INTER_AREA if shrink else cv2.INTER_CUBIC
+    return np.clip(cv2.resize(linear, shape[::-1], interpolation=method), 0, 1).astype(np.float32)
+
+
+def blur(image: Floats, sigma: float) -> Floats:
+    """Gaussian blur, edges reflected; sigma in cells."""
+    if sigma < 0.3:
+        return image
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_REFLECT), np.float32)
+
+
+def read(linear: Floats, width_mm: float, height_mm: float, tip_mm: float, wrist_deg: float, wrist: float,
+         focus: Sequence[tuple[float, float, float, float]]) -> Scene:  # fmt: skip
+    """Analyse a photo in linear light for a sheet of the given size.
+
+    tip_mm: width of the usual crayon; wrist_deg, wrist: the hand's own direction and how much it counts;
+    focus: boxes (x, y, w, h) in fractions of the picture that deserve care.
+    """
+    cell_mm = max(width_mm, height_mm) / WORK_LONG
+    target = fit(linear, work_shape(width_mm, height_mm))
+    lab = oklab(target)
+    tip = tip_mm / cell_mm
+    tangent, coherence = orientation(lab, tip, np.deg2rad(wrist_deg), wrist)
+    return Scene(target, lab, tangent, coherence, detail(lab, tip, focus), cell_mm)
+
+
+def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tuple[Floats, Floats]:
+    """Direction of strokes and its coherence, from a colour structure tensor at three scales.
+
+    Directions are averaged as double-angle vectors. Strong gradients speak far into flat areas, and where
+    none does the wrist's own direction takes over, so nothing is ever undefined.
+    """
+    smooth = blur(lab, 0.35 * tip)
+    gx, gy = _scharr(smooth, 1, 0), _scharr(smooth, 0, 1)
+    e, f, g = (gx * gx).sum(2), (gx * gy).sum(2), (gy * gy).sum(2)
+    cap = np.float32(np.percentile(e + g, 98)) + np.float32(1e-8)
+    limit = np.minimum(1, cap / (e + g + 1e-8))
+    # The stroke runs along the edge: the double angle of the gradient, turned by half a turn.
+    tensor = np.dstack([(g - e) * limit, -2 * f * limit, (e + g) * limit]).astype(np.float32)
+    total = np.zeros_like(tensor)
+    for share, scale in ((1.0, 0.35), (0.25, 1.0), (0.08, 3.0)):
+        total += np.float32(share) * blur(tensor, scale * tip)
+    strength = np.hypot(total[..., 0], total[..., 1])
+    coherence = strength / (total[..., 2] + 1e-6)
+    prior = np.float32(wrist) * np.float32(np.median(total[..., 2]) + 0.02 * cap)
+    c = total[..., 0] + prior * np.float32(np.cos(2 * wrist_rad))
+    s = total[..., 1] + prior * np.float32(np.sin(2 * wrist_rad))
+    angle = 0.5 * np.arctan2(s, c)
+    trust = strength / (strength + prior)
+    return np.dstack([np.cos(angle), np.sin(angle)]).astype(np.float32), (coherence * trust).astype(np.float32)
+
+
+def _scharr(image: Floats, dx: int, dy: int) -> Floats:
+    """Scharr derivative, edges reflected, in units per cell."""
+    return np.asarray(cv2.Scharr(image, cv2.CV_32F, dx, dy, scale=1 / 32, borderType=cv2.BORDER_REFLECT), np.float32)
+
+
+def detail(lab: Floats, tip: float, focus: Sequence[tuple[float, float, float, float]]) -> Floats:
+    """Where a sharpened tip is worth taking: fine local contrast that rises over its surroundings."""
+    fine = np.sqrt(blur(((lab - blur(lab, 0.8 * tip)) ** 2).sum(2), 0.6 * tip))
+    around = blur(fine, 6 * tip)
+    level = np.clip(fine / (0.03 + around) - 0.4, 0, 1.2) / 1.2 * np.clip(fine / 0.06, 0, 1)
+    h, w = level.shape
+    for x, y, width, height in focus:
+        box = np.zeros_like(level)
+        box[int(y * h) : int(np.ceil((y + height) * h)), int(x * w) : int(np.ceil((x + width) * w))] = 1
+        level = np.maximum(level, blur(box, tip))
+    return np.asarray(level, np.float32)
+
+
+def turned(tangent: Floats, degrees: float) -> Floats:
+    """A field of directions turned by an angle."""
+    c, s = np.float32(np.cos(np.deg2rad(degrees))), np.float32(np.sin(np.deg2rad(degrees)))
+    x, y = tangent[..., 0], tangent[..., 1]
+    return np.ascontiguousarray(np.dstack([c * x - s * y, s * x + c * y]))
+
+
+def tone_map(scene: Scene, swatches: Swatches, style: Style) -> Scene:
+    """The photo's range brought into what paper and crayons can give: lightness squeezed at its two ends."""
+    lightest = float(oklab(swatches.paper[None])[0, 0])
+    darkest = float(swatches.lightness().min())
+    lab = scene.lab.copy()
+    low, high = np.percentile(lab[..., 0], (0.5, 99.5))
+    low, high = min(float(low), darkest + 0.02), max(float(high), lightest)
+    lab[..., 0] = darkest + (np.clip(lab[..., 0], low, high) - low) / max(high - low, 1e-6) * (lightest - darkest)
+    chroma = np.hypot(lab[..., 1], lab[..., 2])[..., None]
+    lab[..., 1:] *= style.chroma * (1 + style.vibrance * np.exp(-((chroma / 0.16) ** 2)))
+    return replace(scene, lab=lab, target=from_oklab(lab))

@@ -1,0 +1,30 @@
+"""Colour for decisions: linear RGB to OKLab with the chroma axes doubled.
+
+Doubling a and b makes distances agree with judged colour differences (Ottosson's fits to COMBVD and
+OSA-UCS, as quoted by CSS Color 4, section 20.5), so grey is not taken for teal.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+CHROMA = 2.0  # weight of a and b
+TO_LMS = np.array(
+    [[0.4122214708, 0.5363325363, 0.0514459929],
+     [0.2119034982, 0.6806995451, 0.1073969566],
+     [0.0883024619, 0.2817188376, 0.6299787005]], np.float32)  # fmt: skip
+TO_LAB = np.array(
+    [[0.2104542553, 0.7936177850, -0.0040720468],
+     [1.9779984951 * CHROMA, -2.4285922050 * CHROMA, 0.4505937099 * CHROMA],
+     [0.0259040371 * CHROMA, 0.7827717662 * CHROMA, -0.8086757660 * CHROMA]], np.float32)  # fmt: skip
+
+
+def oklab(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    """OKLab (..., 3) of linear RGB (..., 3), a and b doubled; L is 0..1."""
+    lms = np.cbrt(np.maximum(linear, 0).astype(np.float32) @ TO_LMS.T)
+    return np.asarray(lms @ TO_LAB.T, np.float32)
+
+
+def from_oklab(lab: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Linear RGB in [0, 1] of OKLab with a and b doubled; out of gamut is clipped."""
+    lms = lab @ np.linalg.inv(TO_LAB.astype(np.float64)).T.astype(np.float32)
+    return np.clip(lms**3 @ np.linalg.inv(TO_LMS.astype(np.float64)).T.astype(np.float32), 0, 1).astype(np.float32)

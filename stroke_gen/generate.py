@@ -1,0 +1,61 @@
+"""The conductor: photo to strokes. It lists the stages and holds no mathematics of its own."""
+
+from collections.abc import Callable, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from . import analysis, contours, hand, hatching, separation
+from .analysis import Scene
+from .colour import oklab
+from .drawing import Stroke, Tip
+from .params import Pass, Style
+from .swatches import Swatches
+
+Floats = NDArray[np.float32]
+Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
+
+
+def generate(
+    photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, seed: int, *,
+    observe: Observe, threads: int, focus: Sequence[tuple[float, float, float, float]] = (),
+) -> list[Stroke]:  # fmt: skip
+    """Strokes for a photo in linear light (h, w, 3), in drawing order.
+
+    observe(strokes, shape) draws further strokes on the open sheet and returns what it shows now, as linear
+    light on a grid of `shape`: the generator steps back and looks before each coat.
+    """
+    rng = np.random.default_rng([seed, 3])
+    scene = analysis.read(photo, width_mm, height_mm, style.tip_mm, style.wrist_deg, style.wrist, focus)
+    scene = analysis.tone_map(scene, swatches, style)
+    box = swatches.only(separation.choose_box(scene.lab, swatches, style.crayons))
+    strokes: list[Stroke] = []
+    shape = scene.detail.shape
+    now = observe([], shape)
+    for coat in style.passes:
+        fresh = _coat(scene, now, box, coat, style, rng, threads)
+        strokes += fresh
+        now = observe(fresh, shape)
+    fresh = contours.outlines(scene, now, box, style, rng)
+    observe(fresh, shape)
+    return strokes + fresh
+
+
+def _coat(scene: Scene, now: Floats, box: Swatches, coat: Pass, style: Style, rng: np.random.Generator, threads: int) -> list[Stroke]:
+    """One coat: choose a crayon for every place, then hatch crayon by crayon, light to dark."""
+    width = coat.tip * style.tip_mm
+    tip = Tip("sharp" if coat.sharp else "blunt", width)
+    cells = width / scene.cell_mm
+    aim = oklab(analysis.blur(scene.target, coat.soften * 0.5 * cells))
+    gain, best = separation.gains(analysis.blur(now, 0.5 * cells), aim, box, coat.tone, coat.dark_price, threads)
+    wants = separation.plates(gain, best, box, scene, coat, cells, style.wrist_deg, rng)
+    tangent = analysis.turned(scene.tangent, coat.angle)
+    how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single)
+    strokes = []
+    for k in np.argsort(-box.lightness()):
+        for path, leg in hatching.hatch(wants[k], tangent, scene.coherence, how, rng):
+            pressure = cv2.remap(wants[k], path[:, 0] - 0.5, path[:, 1] - 0.5, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+            pressure = hand.fill_gaps(pressure[:, 0])
+            strokes.append(hand.stroke(path * scene.cell_mm, leg, pressure, box.names[k], tip, coat.name, style, rng))
+    return strokes

@@ -1,0 +1,181 @@
+"""Hatching: zigzags without lifting the crayon, along the orientation field, where a crayon is wanted.
+
+A leg follows the field until the crayon is no longer wanted, another line is near, the turn is too sharp
+or the hand's reach ends; the next leg starts one spacing beside its end and runs back. Lines are kept
+apart by stamping finished legs on a map.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .jit import kernel
+
+Floats = NDArray[np.float32]
+FINE = 2  # cells of the stamp map per work cell
+STEP = 0.6  # work cells between points of a path
+
+
+@dataclass(frozen=True)
+class Hatch:
+    """How a coat of hatching is laid; lengths in work cells."""
+
+    spacing: float  # between legs
+    shortest: float  # a leg
+    reach: float  # the longest leg
+    legs: int  # most legs in one zigzag
+    gap: float  # unwanted ground a leg may cross
+    single: float  # coherence from which legs are drawn singly, as hair is
+
+
+@kernel
+def _free(stamp, x, y, fine):  # type: ignore[no-untyped-def]
+    j, i = int(y * fine), int(x * fine)
+    return 0 <= j < stamp.shape[0] and 0 <= i < stamp.shape[1] and stamp[j, i] == 0
+
+
+@kernel
+def _leg(x, y, dx, dy, want, tangent, stamp, fine, step, reach, gap, sharpest, out):  # type: ignore[no-untyped-def]
+    """Follow the field from (x, y) towards (dx, dy); points into out (n, 2), returns how many."""
+    h, w = want.shape
+    n, last, missing, walked = 0, 0, np.float32(0), np.float32(0)
+    while walked < reach and n < out.shape[0]:
+        j, i = int(y), int(x)
+        tx, ty = tangent[j, i, 0], tangent[j, i, 1]
+        if tx * dx + ty * dy < 0:
+            tx, ty = -tx, -ty
+        if n > 0 and tx * dx + ty * dy < sharpest:
+            break
+        # A hand does not turn at once: the direction follows the field with some inertia.
+        tx, ty = np.float32(0.35) * tx + np.float32(0.65) * dx, np.float32(0.35) * ty + np.float32(0.65) * dy
+        norm = np.sqrt(tx * tx + ty * ty)
+        dx, dy = tx / norm, ty / norm
+        x, y = x + step * dx, y + step * dy
+        if not (0 <= x < w and 0 <= y < h) or not _free(stamp, x, y, fine):
+            break
+        walked += step
+        out[n, 0], out[n, 1] = x, y
+        n += 1
+        if want[int(y), int(x)] > 0:
+            last, missing = n, np.float32(0)
+        else:
+            missing += step
+            if missing > gap:
+                break
+    return last
+
+
+@kernel
+def _press(stamp, path, n, radius, fine):  # type: ignore[no-untyped-def]
+    """Stamp discs of `radius` along a path, so that no other line comes nearer."""
+    r = radius * fine
+    k = int(r) + 1
+    for p in range(n):
+        cx, cy = path[p, 0] * fine, path[p, 1] * fine
+        for j in range(max(0, int(cy) - k), min(stamp.shape[0], int(cy) + k + 1)):
+            for i in range(max(0, int(cx) - k), min(stamp.shape[1], int(cx) + k + 1)):
+                if (i + np.float32(0.5) - cx) ** 2 + (j + np.float32(0.5) - cy) ** 2 <= r * r:
+                    stamp[j, i] = 1
+
+
+@kernel
+def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs, gap, single, step, fine, stamp,  # type: ignore[no-untyped-def]
+           points, first, leg_of):  # fmt: skip
+    """Zigzags from `seeds` (n, 2) in order. Writes points (m, 2), leg_of (m,), first (strokes + 1); returns strokes."""
+    h, w = want.shape
+    forth, back = np.empty((2048, 2), np.float32), np.empty((2048, 2), np.float32)
+    used, strokes, dice = 0, 0, 0
+    first[0] = 0
+    sharpest = np.float32(0.75)
+    for s in range(seeds.shape[0]):
+        x, y = seeds[s, 0], seeds[s, 1]
+        if want[int(y), int(x)] <= 0 or not _free(stamp, x, y, fine):
+            continue
+        if used + 4096 >= points.shape[0] or strokes + 2 >= first.shape[0]:
+            break
+        own_reach = reach * (np.float32(0.6) + np.float32(0.8) * luck[dice % luck.size])
+        side = np.float32(1) if luck[(dice + 1) % luck.size] < 0.5 else np.float32(-1)
+        dice += 2
+        most = 1 if coherence[int(y), int(x)] > single else legs
+        tx, ty = tangent[int(y), int(x), 0], tangent[int(y), int(x), 1]
+        start = used
+        for leg in range(most):
+            if leg == 0:  # through the seed both ways
+                n = _leg(x, y, tx, ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, forth)
+                m = _leg(x, y, -tx, -ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, back)
+            else:  # one spacing beside the last end: a little further on, then back
+                n = _leg(x, y, tx, ty, want, tangent, stamp, fine, step, spacing * np.float32(1.5), gap, sharpest, forth)
+                ragged = own_reach * (np.float32(0.85) + np.float32(0.3) * luck[dice % luck.size])
+                dice += 1
+                m = _leg(x, y, -tx, -ty, want, tangent, stamp, fine, step, ragged, gap, sharpest, back)
+            if (n + m) * step < shortest or used + n + m + 1 >= points.shape[0]:
+                break
+            begin = used
+            for p in range(n - 1, -1, -1):
+                points[used, 0], points[used, 1], leg_of[used] = forth[p, 0], forth[p, 1], leg
+                used += 1
+            points[used, 0], points[used, 1], leg_of[used] = x, y, leg
+            used += 1
+            for p in range(m):
+                points[used, 0], points[used, 1], leg_of[used] = back[p, 0], back[p, 1], leg
+                used += 1
+            _press(stamp, points[begin:used], used - begin, spacing * np.float32(0.46), fine)
+            # The next leg begins beside this end, or further back where the crayon is still wanted.
+            ex, ey = points[used - 1, 0], points[used - 1, 1]
+            q = max(begin, used - 2)
+            tx, ty = ex - points[q, 0], ey - points[q, 1]
+            norm = np.sqrt(tx * tx + ty * ty)
+            if norm <= 0:
+                break
+            tx, ty = tx / norm, ty / norm
+            found = False
+            for p in range(used - 1, max(begin, used - 1 - int(np.float32(3) * spacing / step)), -1):
+                nx, ny = points[p, 0] - side * ty * spacing, points[p, 1] + side * tx * spacing
+                if 0 <= nx < w and 0 <= ny < h and want[int(ny), int(nx)] > 0 and _free(stamp, nx, ny, fine):
+                    x, y, found = nx, ny, True
+                    break
+            side = -side  # the direction has turned about, the side on the sheet has not
+            if not found:
+                break
+        if used > start:
+            strokes += 1
+            first[strokes] = used
+    return strokes
+
+
+def hatch(
+    want: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator
+) -> list[tuple[Floats, NDArray[np.int32]]]:
+    """Zigzags over want > 0: a list of paths (n, 2) in work cells with the number of the leg at each point."""
+    h, w = want.shape
+    seeds = _seeds(want, how, rng)
+    if not len(seeds):
+        return []
+    stamp = np.zeros((h * FINE, w * FINE), np.uint8)
+    length = float((want > 0).sum()) / how.spacing
+    points = np.empty((int(3 * length / STEP) + 20000, 2), np.float32)
+    leg_of = np.empty(len(points), np.int32)
+    first = np.zeros(len(seeds) + 2, np.int64)
+    luck = rng.random(4099, np.float32)
+    numbers = [np.float32(v) for v in (how.spacing, how.shortest, how.reach)]
+    strokes = _hatch(want, tangent, coherence, seeds, luck, *numbers, how.legs, np.float32(how.gap),
+                     np.float32(how.single), np.float32(STEP), FINE, stamp, points, first, leg_of)  # fmt: skip
+    return [(points[first[i] : first[i + 1]].copy(), leg_of[first[i] : first[i + 1]].copy()) for i in range(strokes)]
+
+
+def _seeds(want: Floats, how: Hatch, rng: np.random.Generator) -> Floats:
+    """Places to begin, one to a spacing, region by region as a hand moves over the sheet."""
+    h, w = want.shape
+    pitch = max(how.spacing * 0.7, 1.0)
+    y, x = np.mgrid[0 : h : pitch, 0 : w : pitch].reshape(2, -1)
+    jitter = rng.random((2, x.size)) * pitch
+    x, y = np.minimum(x + jitter[0], w - 1e-3), np.minimum(y + jitter[1], h - 1e-3)
+    wanted = want[y.astype(int), x.astype(int)] > 0
+    x, y = x[wanted], y[wanted]
+    block = max(how.reach, 8.0)
+    row = (y // block).astype(int)
+    col = (x // block).astype(int)
+    col = np.where(row % 2 == 0, col, -col)  # to and fro
+    order = np.lexsort((rng.random(x.size), col, row))
+    return np.stack([x, y], 1)[order].astype(np.float32)

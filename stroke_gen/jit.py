@@ -1,0 +1,29 @@
+"""The one way a kernel is compiled: lazily, without the interpreter lock, kept on disk.
+
+A kernel calls only kernels of its own file and takes every constant as an argument: numba's disk
+cache does not notice a change in another file. Where the cache may live is decided before this
+module is imported, by the environment variable NUMBA_CACHE_DIR; CRAYONIZE_NO_CACHE turns it off.
+"""
+
+import os
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+CACHE = not os.environ.get("CRAYONIZE_NO_CACHE")
+
+
+def kernel(function: F) -> F:
+    """Compile `function` at its first call; threads may run it side by side."""
+    compiled: F = numba.njit(cache=CACHE, nogil=True, error_model="numpy")(function)
+    return compiled
+
+
+def sum_kernel(function: F) -> F:
+    """As `kernel`, for plain sums: the order of additions is the compiler's, so that it can use vectors."""
+    compiled: F = numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})(function)
+    return compiled

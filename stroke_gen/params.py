@@ -1,0 +1,134 @@
+"""Styles: every knob of the generator, with unit, range, effect and starting value.
+
+A style is a TOML file with these keys; the shipped ones lie in stroke_gen/styles. Lengths are in mm on the
+sheet or in widths of the tip ("tips").
+"""
+
+import difflib
+import functools
+import os
+import tomllib
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+_FOLDER = Path(__file__).with_name("styles")
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One coat of hatching over the whole sheet, after a look at what is there."""
+
+    name: str = "coat"
+    tip: float = 1.0  # 0.2..4: width of the tip, in usual tips
+    sharp: bool = False  # a sharpened tip
+    spacing: float = 0.62  # 0.3..2 tips between lines; below 0.5 the hatch closes
+    shortest: float = 2.5  # 0.3..20 tips: shorter lines are left out
+    reach: float = 14.0  # 1..60 tips: the longest line without moving the arm
+    legs: int = 10  # 1..60 lines in one zigzag
+    angle: float = 0.0  # -90..90 degrees against the field, so that coats cross
+    cohere: float = 1.0  # 0..6 tips over which neighbours agree on a crayon
+    edge: float = 0.4  # 0.1..2 tips: how much of the tip must gain for a line to go on; small keeps borders crisp
+    gain: float = 0.02  # 0..1 least gain in colour (OKLab) for which the hand moves
+    detail: float = 0.0  # 0..1 only where the photo has at least this much detail
+    interleave: float = 0.012  # 0..0.5 difference in worth (OKLab) that neighbouring lines overlook to take different crayons
+    tone: float = 1.0  # 0..4 weight of lightness against colour: small in a first coat that seeks the hue
+    dark_price: float = 0.5  # 0..4 reluctance to go darker than the photo
+    soften: float = 0.5  # 0..4 tips: the target is looked at this blurred
+    gap: float = 0.4  # 0..4 tips of unwanted ground a line may cross
+    single: float = 0.5  # 0..1 coherence from which lines are drawn singly, as hair is
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a person draws."""
+
+    title: str = ""
+    tip_mm: float = 2.4  # 0.5..30 width of the usual tip
+    crayons: int = 16  # 1..64 most crayons taken out of the box
+    chroma: float = 1.0  # 0..3 colourfulness asked for
+    vibrance: float = 0.5  # 0..3 more of it where the photo has little, so that skin stays skin
+    wrist_deg: float = -50.0  # -90..90 the hand's own direction; -50 runs from lower left to upper right
+    wrist: float = 0.3  # 0..100 how much the wrist counts against the form
+    press: float = 1.0  # 0.1..5 factor on all forces
+    force_spread: float = 0.18  # 0..1 from line to line
+    swell: float = 0.12  # 0..1 along a line
+    wobble: float = 0.05  # 0..1 tips sideways
+    overshoot: float = 0.15  # 0..3 tips beyond the ends
+    lines: float = 1.0  # 0..5 amount of outline
+    line_tip: float = 0.45  # 0.2..3 width of the outline's tip, in usual tips
+    line_press: float = 1.0  # 0.1..5 factor on the force of outlines
+    passes: tuple[Pass, ...] = (Pass(),)
+
+
+_RANGES = {
+    "tip": (0.2, 4), "spacing": (0.3, 2), "shortest": (0.3, 20), "reach": (1, 60), "legs": (1, 60), "angle": (-90, 90),
+    "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "detail": (0, 1), "interleave": (0, 0.5), "dark_price": (0, 4), "tone": (0, 4),
+    "soften": (0, 4), "gap": (0, 4), "single": (0, 1),
+    "tip_mm": (0.5, 30), "crayons": (1, 64), "chroma": (0, 3), "vibrance": (0, 3), "wrist_deg": (-90, 90), "wrist": (0, 100),
+    "press": (0.1, 5), "force_spread": (0, 1), "swell": (0, 1), "wobble": (0, 1), "overshoot": (0, 3), "lines": (0, 5),
+    "line_tip": (0.2, 3), "line_press": (0.1, 5),
+}  # fmt: skip
+
+
+@functools.cache
+def style_names() -> dict[str, str]:
+    """The shipped styles by name, with their titles."""
+    return {p.stem: str(tomllib.loads(p.read_text("utf-8"))["title"]) for p in sorted(_FOLDER.glob("*.toml"))}
+
+
+def load_style(source: str) -> Style:
+    """A shipped style by name, or a user's TOML file. ValueError names the key and the nearest valid one."""
+    path = _FOLDER / f"{source}.toml" if source in style_names() else Path(source)
+    if path.suffix != ".toml" or not os.path.isfile(path):
+        near = difflib.get_close_matches(source, style_names(), 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"valid: {', '.join(style_names())}, or a .toml file"
+        raise ValueError(f"style: {source!r} is unknown; {hint}")
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not TOML: {error}") from None
+    return style_from(table, str(path))
+
+
+def style_from(table: dict[str, Any], where: str) -> Style:
+    """A style from its table; `where` begins the error line."""
+    passes = table.pop("pass", [])
+    if not isinstance(passes, list) or not all(isinstance(row, dict) for row in passes):
+        raise ValueError(f"{where}: pass: write each coat as a [[pass]] table")
+    values = _checked(table, Style, where)
+    coats = tuple(Pass(**_checked(row, Pass, f"{where}: pass {i + 1}")) for i, row in enumerate(passes))
+    return Style(**values, passes=coats)
+
+
+def _checked(table: dict[str, Any], kind: type, where: str) -> dict[str, Any]:
+    """The table if every key is known, of the right type and in range."""
+    known = {f.name: f for f in fields(kind) if f.name != "passes"}
+    for key, value in table.items():
+        if key not in known:
+            near = difflib.get_close_matches(key, [*known, "pass"], 1, 0.4)
+            raise ValueError(f"{where}: unknown key {key!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+        default = known[key].default
+        right = isinstance(value, type(default)) or (isinstance(default, float) and type(value) is int)
+        if not right or (isinstance(value, bool) and not isinstance(default, bool)):
+            raise ValueError(f"{where}: {key} = {value!r} is not a {type(default).__name__}")
+        if key in _RANGES and not _RANGES[key][0] <= value <= _RANGES[key][1]:
+            low, high = _RANGES[key]
+            raise ValueError(f"{where}: {key} = {value!r} is not between {low:g} and {high:g}")
+    return table
+
+
+FORCES = {"light": 0.5, "normal": 1.0, "heavy": 1.7}
+
+
+def with_force(style: Style, force: str | float) -> Style:
+    """The style pressed lighter or heavier: a name of FORCES or a factor from 0.1 to 5."""
+    factor = FORCES.get(force) if isinstance(force, str) else force
+    if factor is None:
+        try:
+            factor = float(force)
+        except ValueError:
+            factor = 0.0
+    if not 0.1 <= factor <= 5:
+        raise ValueError(f"force: {force!r} is neither {', '.join(FORCES)} nor a number from 0.1 to 5")
+    return replace(style, press=style.press * factor)
