@@ -28,3 +28,13 @@ def from_oklab(lab: NDArray[np.float32]) -> NDArray[np.float32]:
     """Linear RGB in [0, 1] of OKLab with a and b doubled; out of gamut is clipped."""
     lms = lab @ np.linalg.inv(TO_LAB.astype(np.float64)).T.astype(np.float32)
     return np.clip(lms**3 @ np.linalg.inv(TO_LMS.astype(np.float64)).T.astype(np.float32), 0, 1).astype(np.float32)
+
+
+def cube_root(x):  # type: ignore[no-untyped-def]
+    """Cube root for kernels, x in 0..1, to 1e-4: a first guess from the float's bits, two Newton steps."""
+    if x < np.float32(1e-7):
+        return np.float32(0)
+    y = np.int32(np.float32(x).view(np.int32) // 3 + 709921077).view(np.float32)
+    for _ in range(2):
+        y = (y + y + x / (y * y)) * np.float32(0.33333334)
+    return y

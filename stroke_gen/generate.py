@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analysis, contours, hand, hatching, separation
+from . import analysis, contours, hand, hatching, recipes, separation
 from .analysis import Scene
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .params import Pass, Style
+from .recipes import Recipes
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
@@ -29,27 +30,30 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     scene = analysis.read(photo, width_mm, height_mm, style.tip_mm, style.wrist_deg, style.wrist, focus)
     scene = analysis.tone_map(scene, swatches, style)
-    box = swatches.only(separation.choose_box(scene.lab, swatches, style.crayons))
+    plan = recipes.find(scene.lab, swatches, style.recipes, style.crayons, rng)
     strokes: list[Stroke] = []
     shape = scene.detail.shape
     now = observe([], shape)
     for coat in style.passes:
-        fresh = _coat(scene, now, box, coat, style, rng, threads)
+        fresh = _coat(scene, now, swatches, plan, coat, style, rng, threads)
         strokes += fresh
         now = observe(fresh, shape)
-    fresh = contours.outlines(scene, now, box, style, rng)
+    fresh = contours.outlines(scene, now, swatches.only(plan.crayons()), style, rng)
     observe(fresh, shape)
     return strokes + fresh
 
 
-def _coat(scene: Scene, now: Floats, box: Swatches, coat: Pass, style: Style, rng: np.random.Generator, threads: int) -> list[Stroke]:
+def _coat(
+    scene: Scene, now: Floats, box: Swatches, plan: Recipes, coat: Pass, style: Style, rng: np.random.Generator, threads: int
+) -> list[Stroke]:  # fmt: skip
     """One coat: choose a crayon for every place, then hatch crayon by crayon, light to dark."""
     width = coat.tip * style.tip_mm
     tip = Tip("sharp" if coat.sharp else "blunt", width)
     cells = width / scene.cell_mm
     aim = oklab(analysis.blur(scene.target, coat.soften * 0.5 * cells))
     gain, best = separation.gains(analysis.blur(now, 0.5 * cells), aim, box, coat.tone, coat.dark_price, threads)
-    wants = separation.plates(gain, best, box, scene, coat, cells, style.wrist_deg, rng)
+    streaks = separation.streaks(*aim.shape[:2], cells, style.wrist_deg, rng)
+    wants = separation.plates(gain, best, box, scene, coat, cells, plan, streaks)
     tangent = analysis.turned(scene.tangent, coat.angle)
     how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single)
     strokes = []

@@ -20,6 +20,7 @@ class Pass:
     """One coat of hatching over the whole sheet, after a look at what is there."""
 
     name: str = "coat"
+    kind: str = "free"  # base or shade: by the recipe; free: whatever helps most after a look at the sheet
     tip: float = 1.0  # 0.2..4: width of the tip, in usual tips
     sharp: bool = False  # a sharpened tip
     spacing: float = 0.62  # 0.3..2 tips between lines; below 0.5 the hatch closes
@@ -31,7 +32,6 @@ class Pass:
     edge: float = 0.4  # 0.1..2 tips: how much of the tip must gain for a line to go on; small keeps borders crisp
     gain: float = 0.02  # 0..1 least gain in colour (OKLab) for which the hand moves
     detail: float = 0.0  # 0..1 only where the photo has at least this much detail
-    interleave: float = 0.012  # 0..0.5 difference in worth (OKLab) that neighbouring lines overlook to take different crayons
     tone: float = 1.0  # 0..4 weight of lightness against colour: small in a first coat that seeks the hue
     dark_price: float = 0.5  # 0..4 reluctance to go darker than the photo
     soften: float = 0.5  # 0..4 tips: the target is looked at this blurred
@@ -46,6 +46,7 @@ class Style:
     title: str = ""
     tip_mm: float = 2.4  # 0.5..30 width of the usual tip
     crayons: int = 16  # 1..64 most crayons taken out of the box
+    recipes: int = 20  # 1..100 kinds of colour told apart
     chroma: float = 1.0  # 0..3 colourfulness asked for
     vibrance: float = 0.5  # 0..3 more of it where the photo has little, so that skin stays skin
     wrist_deg: float = -50.0  # -90..90 the hand's own direction; -50 runs from lower left to upper right
@@ -63,9 +64,9 @@ class Style:
 
 _RANGES = {
     "tip": (0.2, 4), "spacing": (0.3, 2), "shortest": (0.3, 20), "reach": (1, 60), "legs": (1, 60), "angle": (-90, 90),
-    "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "detail": (0, 1), "interleave": (0, 0.5), "dark_price": (0, 4), "tone": (0, 4),
+    "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "detail": (0, 1), "dark_price": (0, 4), "tone": (0, 4),
     "soften": (0, 4), "gap": (0, 4), "single": (0, 1),
-    "tip_mm": (0.5, 30), "crayons": (1, 64), "chroma": (0, 3), "vibrance": (0, 3), "wrist_deg": (-90, 90), "wrist": (0, 100),
+    "tip_mm": (0.5, 30), "crayons": (1, 64), "recipes": (1, 100), "chroma": (0, 3), "vibrance": (0, 3), "wrist_deg": (-90, 90), "wrist": (0, 100),
     "press": (0.1, 5), "force_spread": (0, 1), "swell": (0, 1), "wobble": (0, 1), "overshoot": (0, 3), "lines": (0, 5),
     "line_tip": (0.2, 3), "line_press": (0.1, 5),
 }  # fmt: skip

@@ -12,26 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .analysis import Scene, blur
-from .colour import TO_LAB, TO_LMS, oklab
+from .colour import TO_LAB, TO_LMS, cube_root, oklab
 from .jit import kernel
 from .params import Pass
+from .recipes import GRAIN_PRICE, TONE, Recipes, nearest
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
-GRAIN_PRICE = 0.35  # OKLab units per unit of grain
+STRANGER_PRICE = 0.015  # a free coat keeps to the recipe's crayons unless another gains this much more
 BAND = 32
 
 
-@kernel
-def _cube_root(x):  # type: ignore[no-untyped-def]
-    """Cube root for x in 0..1 to 1e-4: a first guess from the float's exponent, two Newton steps."""
-    if x < np.float32(1e-7):
-        return np.float32(0)
-    bits = np.float32(x).view(np.int32)
-    y = np.int32(bits // 3 + 709921077).view(np.float32)
-    for _ in range(2):
-        y = (y + y + x / (y * y)) * np.float32(0.33333334)
-    return y
+_cube_root = kernel(cube_root)
 
 
 @kernel
@@ -87,70 +79,98 @@ def gains(
     return gain, best
 
 
-def choose_box(lab: Floats, swatches: Swatches, most: int) -> list[int]:
-    """The crayons worth taking out of the box for this picture, at most `most`: greedy, best first.
+@kernel
+def _base(lab, group, base, shade, paper, a, b, grain, log_p, to_lms, to_lab, grain_price, sharp, out):  # type: ignore[no-untyped-def]
+    """Softly chosen pressure of the base coat for each cell, looking ahead to the shade over it."""
+    pressures = log_p.size
+    light = np.empty(3, np.float32)
+    cost = np.empty(pressures * (pressures + 1), np.float32)
+    for y in range(lab.shape[0]):
+        for x in range(lab.shape[1]):
+            k1, k2 = base[group[y, x]], shade[group[y, x]]
+            number = 0
+            for p1 in range(pressures):
+                for p2 in range(-1, pressures if k1 != k2 else 0):  # -1: no shade
+                    price = grain[k1, p1]
+                    for c in range(3):
+                        light[c] = a[k1, p1, c] * paper[c] + b[k1, p1, c]
+                    if p2 >= 0:
+                        price = price * (a[k2, p2, 0] + a[k2, p2, 1] + a[k2, p2, 2]) / 3 + np.float32(0.7) * grain[k2, p2]
+                        for c in range(3):
+                            light[c] = a[k2, p2, c] * light[c] + b[k2, p2, c]
+                    l0 = _cube_root(to_lms[0, 0] * light[0] + to_lms[0, 1] * light[1] + to_lms[0, 2] * light[2])
+                    m0 = _cube_root(to_lms[1, 0] * light[0] + to_lms[1, 1] * light[1] + to_lms[1, 2] * light[2])
+                    s0 = _cube_root(to_lms[2, 0] * light[0] + to_lms[2, 1] * light[1] + to_lms[2, 2] * light[2])
+                    error = np.float32(0)
+                    for c in range(3):
+                        d = to_lab[c, 0] * l0 + to_lab[c, 1] * m0 + to_lab[c, 2] * s0 - lab[y, x, c]
+                        error += d * d
+                    cost[number] = np.sqrt(error) + grain_price * price
+                    number += 1
+            least = cost[0]
+            for m in range(1, number):
+                least = min(least, cost[m])
+            each = number // pressures
+            total, mean = np.float32(0), np.float32(0)
+            for m in range(number):
+                weight = np.exp((least - cost[m]) * sharp)
+                total += weight
+                mean += weight * log_p[m // each]
+            out[y, x] = np.exp(mean / total)
 
-    Each next crayon is the one that, alone or over one already chosen, brings a sample of the picture's
-    colours nearest to what can be drawn.
+
+def base_pressure(lab: Floats, group: NDArray[np.int64], recipes: Recipes, swatches: Swatches) -> Floats:
+    """Pressure (h, w) of the base coat that, with the shade to come, brings each place nearest to its target.
+
+    Choices of nearly equal worth are averaged, so pressure follows tone without steps.
     """
-    sample = lab.reshape(-1, 3)
-    sample = sample[:: max(1, len(sample) // 600)]
-    paper = oklab(swatches.paper[None])[0]
-    error = np.linalg.norm(sample - paper, axis=1)
-    single = swatches.over(swatches.paper)  # (k, p, 3)
-    price = GRAIN_PRICE * swatches.grain
-    chosen: list[int] = []
-    cost = np.stack([_nearest(sample, single[k], price[k]) for k in range(len(swatches.names))])
-    for _ in range(min(most, len(swatches.names))):
-        if chosen:
-            last = chosen[-1]
-            for k in range(len(swatches.names)):
-                over = (swatches.a[k] * single[last][:, None] + swatches.b[k]).reshape(-1, 3)
-                under = (swatches.a[last] * single[k][:, None] + swatches.b[last]).reshape(-1, 3)
-                both = np.concatenate([over, under])
-                cost[k] = np.minimum(cost[k], _nearest(sample, both, np.zeros(len(both), np.float32)) + 0.04)
-        gain = [float(np.maximum(error - c, 0).mean()) if k not in chosen else -1.0 for k, c in enumerate(cost)]
-        best = int(np.argmax(gain))
-        if chosen and gain[best] < 2e-4:
-            break
-        chosen.append(best)
-        error = np.minimum(error, cost[best])
-    return sorted(chosen)
-
-
-def _nearest(sample: Floats, colours: Floats, price: Floats) -> Floats:
-    """Of each sample colour (n,), the distance to the nearest of `colours` (m, 3) with its price."""
-    distance = np.linalg.norm(sample[:, None] - oklab(colours)[None], axis=2) + price
-    return np.asarray(distance.min(1), np.float32)
+    out = np.empty(lab.shape[:2], np.float32)
+    _base(lab, group, recipes.base, recipes.shade, swatches.paper, swatches.a, swatches.b, swatches.grain,
+          np.log(swatches.pressures), TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(1 / 0.008), out)  # fmt: skip
+    return out
 
 
 def plates(gain: Floats, best: NDArray[np.int8], swatches: Swatches, scene: Scene, coat: Pass, cells: float,
-           wrist_deg: float, rng: np.random.Generator) -> Floats:  # fmt: skip
+           recipes: Recipes, streaks: Floats) -> Floats:  # fmt: skip
     """The pressure (k, h, w) wanted of each crayon, 0 where it is not: one crayon at most in each place.
 
-    Neighbours agree on the crayon over `coat.cohere` tips, with streaks of noise so that crayons of similar
-    worth lie side by side; a line goes on while the tip as a whole gains.
+    The recipe says which crayon a base or shade coat takes; a free coat takes the one of most worth, with
+    neighbours agreeing over `coat.cohere` tips. A line goes on while the tip as a whole gains.
     """
-    crayons, h, w = gain.shape
-    worth = np.empty_like(gain)
-    tip_gain = np.empty_like(gain)
-    for k in range(crayons):
-        tip_gain[k] = blur(gain[k], coat.edge * cells)
-        streaks = _streaks(h, w, cells, wrist_deg, rng)
-        worth[k] = blur(gain[k], coat.cohere * cells) + coat.interleave * streaks
-    chosen = worth.argmax(0)
+    crayons = len(gain)
+    group = grouped(scene.lab, recipes, coat.cohere * cells)
+    if coat.kind == "base":
+        rival = streaks > 0.55
+        chosen = np.where(rival, recipes.rival[group], recipes.base[group])
+        level = blur(np.log(base_pressure(scene.lab, group, recipes, swatches)), 0.3 * cells)
+    elif coat.kind == "shade":
+        chosen = recipes.shade[group]
+    else:
+        worth = np.stack([blur(g, coat.cohere * cells) for g in gain])
+        used = np.isin(np.arange(crayons), recipes.crayons())
+        worth[~used] = -9
+        home = [(recipes.base[group] == k) | (recipes.shade[group] == k) for k in range(crayons)]
+        chosen = (worth - np.where(home, 0, STRANGER_PRICE)).argmax(0)
     wants = np.zeros_like(gain)
     allowed = scene.detail >= coat.detail
-    for k in range(crayons):
-        here = (chosen == k) & (tip_gain[k] > coat.gain) & allowed
+    for k in np.unique(chosen):
+        here = (chosen == k) & allowed & (blur(gain[k], coat.edge * cells) > coat.gain)
         if here.any():
-            pressure = swatches.pressures[best[k]]
-            level = np.exp(blur(np.log(pressure), 0.3 * cells))
-            wants[k] = np.where(here, level, 0)
+            if coat.kind != "base":
+                level = blur(np.log(swatches.pressures)[best[k]], 0.3 * cells)
+            wants[k] = np.where(here, np.exp(level), 0)
     return wants
 
 
-def _streaks(h: int, w: int, cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:
+def grouped(lab: Floats, recipes: Recipes, sigma: float) -> NDArray[np.int64]:
+    """The recipe (h, w) of each place: its nearest group of colours, after neighbours have agreed."""
+    weighted = lab * np.array([TONE, 1, 1], np.float32)
+    label = nearest(weighted, recipes.centres)
+    votes = np.stack([blur((label == g).astype(np.float32), sigma) for g in range(len(recipes.centres))])
+    return votes.argmax(0)
+
+
+def streaks(h: int, w: int, cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:
     """Noise of unit variance in streaks along the wrist's direction, about one line wide and ten long."""
     angle = np.deg2rad(wrist_deg)
     y, x = np.mgrid[:h, :w].astype(np.float32)
@@ -158,4 +178,4 @@ def _streaks(h: int, w: int, cells: float, wrist_deg: float, rng: np.random.Gene
     across = (y * np.cos(angle) - x * np.sin(angle)) / (1.3 * cells)
     along, across = along - along.min(), across - across.min()
     noise = rng.standard_normal((int(across.max()) + 3, int(along.max()) + 3)).astype(np.float32)
-    return cv2.remap(noise, along.astype(np.float32), across.astype(np.float32), cv2.INTER_LINEAR)
+    return np.asarray(cv2.remap(noise, along.astype(np.float32), across.astype(np.float32), cv2.INTER_LINEAR))

@@ -1,0 +1,161 @@
+"""Recipes: which crayon under which for each kind of colour in the photo, as a person mixes skin or sky.
+
+The picture's colours are grouped by hue (lightness counts less: force gives tone), and each group gets one
+ordered pair of crayons, light under dark, that serves its whole range of tones at the least cost: distance
+seen from afar, grain, and reluctance to take one more crayon out of the box.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .colour import TO_LAB, TO_LMS, cube_root
+from .jit import kernel
+from .swatches import Swatches
+
+Floats = NDArray[np.float32]
+TONE = 0.45  # weight of lightness when colours are grouped
+SAMPLES = 40  # colours by which a group is judged
+GRAIN_PRICE = 0.35  # OKLab units per unit of grain
+LAYER_PRICE = 0.008  # for the second crayon
+RIVAL = 0.015  # a base this little dearer lies between the lines of the first
+
+
+@dataclass(frozen=True, eq=False)
+class Recipes:
+    """A recipe for each group of colours."""
+
+    centres: Floats  # (groups, 3) OKLab with lightness weighted
+    base: NDArray[np.int64]  # (groups,) crayon of the first coat
+    shade: NDArray[np.int64]  # (groups,) crayon over it; equal to base where one is enough
+    rival: NDArray[np.int64]  # (groups,) a base nearly as good, to lie between; equal to base where none is
+
+    def crayons(self) -> list[int]:
+        """All crayons in use, by their place in the box."""
+        return sorted({int(k) for k in np.concatenate([self.base, self.shade, self.rival])})
+
+
+_cube_root = kernel(cube_root)
+
+
+@kernel
+def _costs(sample, a, b, grain, paper, heavy, pairs, to_lms, to_lab, grain_price, layer_price, cost):  # type: ignore[no-untyped-def]
+    """Mean over samples (groups, n, 3) of the least cost over both pressures of each pair: cost (groups, pairs)."""
+    groups, n = sample.shape[:2]
+    pressures = grain.shape[1]
+    colour, price = np.empty((pressures * pressures, 3), np.float32), np.empty(pressures * pressures, np.float32)
+    for q in range(pairs.shape[0]):
+        k1, k2 = pairs[q]
+        number = 0
+        for p1 in range(pressures):
+            for p2 in range(pressures if k1 != k2 else 1):
+                light = np.empty(3, np.float32)
+                for c in range(3):
+                    light[c] = a[k1, p1, c] * paper[c] + b[k1, p1, c]
+                dots = grain[k1, p1]
+                if k1 != k2:
+                    below = light[0] + light[1] + light[2]
+                    white = paper[0] + paper[1] + paper[2]
+                    depth = abs(below - heavy[k2]) / max(white - heavy[k2], np.float32(0.1))
+                    # The first coat's flecks are covered by the share of ground the second hides.
+                    dots = dots * (a[k2, p2, 0] + a[k2, p2, 1] + a[k2, p2, 2]) / 3 + grain[k2, p2] * min(depth, np.float32(1))
+                    for c in range(3):
+                        light[c] = a[k2, p2, c] * light[c] + b[k2, p2, c]
+                l0 = _cube_root(to_lms[0, 0] * light[0] + to_lms[0, 1] * light[1] + to_lms[0, 2] * light[2])
+                m0 = _cube_root(to_lms[1, 0] * light[0] + to_lms[1, 1] * light[1] + to_lms[1, 2] * light[2])
+                s0 = _cube_root(to_lms[2, 0] * light[0] + to_lms[2, 1] * light[1] + to_lms[2, 2] * light[2])
+                for c in range(3):
+                    colour[number, c] = to_lab[c, 0] * l0 + to_lab[c, 1] * m0 + to_lab[c, 2] * s0
+                price[number] = grain_price * dots + (layer_price if k1 != k2 else np.float32(0))
+                number += 1
+        for g in range(groups):
+            total = np.float32(0)
+            for i in range(n):
+                least = np.float32(9)
+                for m in range(number):
+                    dl, da, db = colour[m, 0] - sample[g, i, 0], colour[m, 1] - sample[g, i, 1], colour[m, 2] - sample[g, i, 2]
+                    least = min(least, np.sqrt(dl * dl + da * da + db * db) + price[m])
+                total += least
+            cost[g, q] = total / n
+
+
+def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random.Generator) -> Recipes:
+    """Recipes for a picture in OKLab (h, w, 3): at most `groups` of them from at most `most` crayons."""
+    flat = lab.reshape(-1, 3)
+    flat = flat[rng.permutation(len(flat))[:6000]]
+    weighted = flat * np.array([TONE, 1, 1], np.float32)
+    centres, label = _group(weighted, groups, rng)
+    size = np.bincount(label, minlength=len(centres)).astype(np.float64)
+    sample = np.stack([flat[rng.choice(np.flatnonzero(label == g), SAMPLES)] for g in range(len(centres))])
+    light = swatches.lightness()
+    count = len(swatches.names)
+    pairs = np.array([(i, j) for i in range(count) for j in range(count) if i == j or light[i] > light[j]], np.int64)
+    heavy = swatches.over(swatches.paper)[:, -1].sum(1)
+    cost = np.empty((len(centres), len(pairs)), np.float32)
+    _costs(sample, swatches.a, swatches.b, swatches.grain, swatches.paper, heavy, pairs, TO_LMS, TO_LAB,
+           np.float32(GRAIN_PRICE), np.float32(LAYER_PRICE), cost)  # fmt: skip
+    allowed = _box(cost, pairs, size / size.sum(), count, most)
+    cost[:, ~(allowed[pairs[:, 0]] & allowed[pairs[:, 1]])] = 9
+    best = cost.argmin(1)
+    base, shade = pairs[best].T
+    return Recipes(centres, base, shade, _rivals(cost, pairs, base, shade))
+
+
+def _group(colours: Floats, groups: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
+    """k-means with far-apart beginnings: centres (groups, 3) and the label of each colour. Empty groups go."""
+    centres = colours[rng.integers(len(colours))][None]
+    distance = np.full(len(colours), np.inf)
+    for _ in range(groups - 1):
+        distance = np.minimum(distance, ((colours - centres[-1]) ** 2).sum(1))
+        if distance.max() < 1e-5:
+            break
+        centres = np.vstack([centres, colours[rng.choice(len(colours), p=distance / distance.sum())]])
+    label = nearest(colours, centres)
+    for _ in range(12):
+        kept = [colours[label == g].mean(0) for g in range(len(centres)) if (label == g).any()]
+        centres = np.array(kept, np.float32)
+        label = nearest(colours, centres)
+    kept_groups = np.unique(label)
+    return centres[kept_groups], np.searchsorted(kept_groups, label)
+
+
+def nearest(colours: Floats, centres: Floats) -> NDArray[np.int64]:
+    """Index of the nearest centre for colours (..., 3)."""
+    best = np.full(colours.shape[:-1], np.inf, np.float32)
+    label = np.zeros(colours.shape[:-1], np.int64)
+    for g, centre in enumerate(centres):
+        distance = ((colours - centre) ** 2).sum(-1)
+        closer = distance < best
+        best[closer], label[closer] = distance[closer], g
+    return label
+
+
+def _box(cost: Floats, pairs: NDArray[np.int64], weight: NDArray[np.float64], count: int, most: int) -> NDArray[np.bool_]:
+    """Which crayons to take: starting from all, put back the one least missed until `most` remain in use."""
+    allowed = np.ones(count, np.bool_)
+    while True:
+        usable = allowed[pairs[:, 0]] & allowed[pairs[:, 1]]
+        best = np.where(usable, cost, 9).argmin(1)
+        used = np.unique(pairs[best])
+        if len(used) <= most:
+            allowed[:] = False
+            allowed[used] = True
+            return allowed
+        without = []
+        for k in used:
+            rest = usable & (pairs != k).all(1)
+            without.append((np.where(rest, cost, 9).min(1) * weight).sum())
+        allowed[used[int(np.argmin(without))]] = False
+
+
+def _rivals(cost: Floats, pairs: NDArray[np.int64], base: NDArray[np.int64], shade: NDArray[np.int64]) -> NDArray[np.int64]:
+    """For each group the cheapest other base under the same shade, where it is hardly dearer; else the base."""
+    rival = base.copy()
+    for g in range(len(base)):
+        least = cost[g].min()
+        same = (pairs[:, 1] == shade[g]) & (pairs[:, 0] != base[g]) & (pairs[:, 0] != shade[g])
+        others = np.where(same & (cost[g] < least + RIVAL), cost[g], 9)
+        if others.min() < 9:
+            rival[g] = pairs[others.argmin(), 0]
+    return rival
