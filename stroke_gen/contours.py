@@ -1,14 +1,128 @@
-"""Outlines: the few lines that matter, in the darkest crayon that fits, with a sharpened edge."""
+"""Outlines: the few lines that matter, in the darkest crayon that fits, with a sharpened edge.
 
+Chains of edge pixels come from OpenCV's EdgeDrawing on the lightness; they are faired, ranked by length,
+contrast and detail, and drawn as far as the style's budget of line goes.
+"""
+
+from dataclasses import dataclass
+
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .analysis import Scene
-from .drawing import Stroke
+from . import hand
+from .analysis import Scene, blur
+from .colour import oklab
+from .drawing import Stroke, Tip
 from .params import Style
 from .swatches import Swatches
 
+Floats = NDArray[np.float32]
+SCALE = 2  # edge pixels per work cell
+BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
+LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
-def outlines(scene: Scene, now: NDArray[np.float32], box: Swatches, style: Style, rng: np.random.Generator) -> list[Stroke]:
-    """Outline strokes for a scene whose sheet shows `now`."""
-    return []
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A faired chain of edge points in work cells with what speaks for drawing it."""
+
+    path: Floats  # (n, 2)
+    contrast: Floats  # (n,) difference of lightness between its two sides
+    worth: float
+
+
+def outlines(scene: Scene, now: Floats, box: Swatches, style: Style, rng: np.random.Generator) -> list[Stroke]:
+    """Outline strokes for a scene whose sheet shows `now` (h, w, 3), light crayons first."""
+    if style.lines <= 0:
+        return []
+    tip = Tip("sharp", style.line_tip * style.tip_mm)
+    width = tip.width_mm / scene.cell_mm
+    budget = style.lines * BUDGET * max(scene.detail.shape)
+    picked = []
+    for line in sorted(_lines(scene, width), key=lambda line: -line.worth):
+        budget -= len(line.path)
+        if budget < 0:
+            break
+        picked.append(line)
+    chosen = [_crayon(line, scene, now, box, style) for line in picked]
+    order = sorted(range(len(picked)), key=lambda i: (-chosen[i][0], i))
+    strokes: list[Stroke] = []
+    for i in order:
+        _, crayon, pressure = chosen[i]
+        level = np.clip(picked[i].contrast / 0.25, 0.35, 1.0) * pressure
+        path = picked[i].path
+        paths = hand.Paths(path, level.astype(np.float32), np.zeros(len(path), np.int32), np.array([0, len(path)]))
+        strokes += hand.draw(paths, scene.cell_mm, crayon, tip, "line", style, rng)
+    return strokes
+
+
+def _lines(scene: Scene, width: float) -> list[Line]:
+    """Candidate lines of the scene for a tip `width` cells wide."""
+    lightness = blur(scene.lab[..., 0], max(0.3 * width, 0.7))
+    h, w = lightness.shape
+    grey = cv2.resize(np.clip(lightness * 255, 0, 255).astype(np.uint8), (w * SCALE, h * SCALE), interpolation=cv2.INTER_CUBIC)
+    detector = cv2.ximgproc.createEdgeDrawing()
+    settings = cv2.ximgproc_EdgeDrawing_Params()
+    settings.GradientThresholdValue, settings.AnchorThresholdValue = 14, 4
+    settings.MinPathLength = max(8, int(3 * width * SCALE))
+    detector.setParams(settings)
+    detector.detectEdges(grey)
+    lines = []
+    for chain in detector.getSegments():
+        path = (np.asarray(chain, np.float32) + 0.5) / SCALE
+        for part in np.array_split(path, max(1, int(len(path) / SCALE / (LONGEST * width)))):
+            line = _line(_fair(part, 1.5 * SCALE), scene, lightness, width)
+            if line is not None:
+                lines.append(line)
+    return lines
+
+
+def _fair(path: Floats, sigma: float) -> Floats:
+    """A chain smoothed along itself, its ends kept, and thinned to one point a cell or so."""
+    if len(path) < 5:
+        return path
+    radius = min(int(3 * sigma), len(path) - 1)
+    padded = np.concatenate([2 * path[:1] - path[radius:0:-1], path, 2 * path[-1:] - path[-2 : -radius - 2 : -1]])
+    weights = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    weights /= weights.sum()
+    smooth = np.stack([np.convolve(padded[:, c], weights, "valid") for c in (0, 1)], 1)
+    return smooth[:: SCALE].astype(np.float32)
+
+
+def _line(path: Floats, scene: Scene, lightness: Floats, width: float) -> Line | None:
+    """The chain as a line, if it is long and strong enough to be one."""
+    if len(path) < max(3.0, 2.5 * width):
+        return None
+    sides = [_sample(lightness, path + side * _normal(path) * 0.6 * width) for side in (1, -1)]
+    contrast = np.abs(sides[0] - sides[1])
+    mean = float(contrast.mean())
+    if mean < 0.05:
+        return None
+    detail = float(_sample(scene.detail, path).mean())
+    return Line(path, contrast, mean * len(path) ** 0.5 * (1 + 1.5 * detail))
+
+
+def _normal(path: Floats) -> Floats:
+    tangent = np.gradient(path, axis=0)
+    tangent /= np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-6)[:, None]
+    return np.stack([-tangent[:, 1], tangent[:, 0]], 1).astype(np.float32)
+
+
+def _sample(image: Floats, path: Floats) -> Floats:
+    """Values of a map (h, w) or (h, w, 3) along a path."""
+    j = np.clip(path[:, 1].astype(int), 0, image.shape[0] - 1)
+    i = np.clip(path[:, 0].astype(int), 0, image.shape[1] - 1)
+    return image[j, i]
+
+
+def _crayon(line: Line, scene: Scene, now: Floats, box: Swatches, style: Style) -> tuple[float, str, float]:
+    """Lightness, name and pressure of the crayon that comes nearest to the line's darker side, a little darker still."""
+    width = style.line_tip * style.tip_mm / scene.cell_mm
+    sides = [_sample(scene.lab, line.path + side * _normal(line.path) * 0.6 * width).mean(0) for side in (1, -1)]
+    aim = min(sides, key=lambda lab: float(lab[0])) - np.array([0.05, 0, 0], np.float32)
+    ground = _sample(now, line.path).mean(0)
+    colours = oklab(box.over(ground))[:, 2:]
+    off = np.linalg.norm((colours - aim) * np.array([1, 0.8, 0.8]), axis=2)
+    k, p = np.unravel_index(int(off.argmin()), off.shape)
+    return float(box.lightness()[k]), box.names[k], float(box.pressures[2 + p]) * style.line_press

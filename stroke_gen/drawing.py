@@ -61,6 +61,7 @@ _DRAWING_KEYS = (
 )
 _STROKE_KEYS = ("crayon", "path", "force", "tip", "note")
 _TIP_KEYS = ("kind", "width_mm", "angle_deg")
+_CHUNK = 2**20
 _DECIMALS = 3  # a micrometre, a thousandth of a newton
 _NO_FORCE = -math.inf  # stands where a point among [x, y, force] points has no force of its own
 
@@ -132,13 +133,16 @@ def load_drawing(source: str | os.PathLike[str] | TextIO) -> Drawing:
 
 
 def _read(stream: TextIO, where: str) -> Drawing:
+    parts, length = [], 0
     try:
-        text = stream.read(MAX_CHARS + 1)
+        while part := stream.read(_CHUNK):
+            parts.append(part)
+            length += len(part)
+            if length > MAX_CHARS:
+                raise ValueError(f"{where}: longer than {MAX_CHARS:,} characters")
     except UnicodeDecodeError as error:
         raise ValueError(f"{where}: not UTF-8 text") from error
-    if len(text) > MAX_CHARS:
-        raise ValueError(f"{where}: longer than {MAX_CHARS:,} characters")
-    return drawing_from_json(_parsed(text, where), where)
+    return drawing_from_json(_parsed("".join(parts), where), where)
 
 
 def _parsed(text: str, where: str) -> Any:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,10 +55,8 @@ def _coat(
     wants = separation.plates(gain, best, box, scene, coat, cells, plan, streaks)
     tangent = analysis.turned(scene.tangent, coat.angle)
     how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single)
-    strokes = []
+    strokes: list[Stroke] = []
     for k in np.argsort(-box.lightness()):
-        for path, leg in hatching.hatch(wants[k], tangent, scene.coherence, how, rng):
-            pressure = cv2.remap(wants[k], path[:, 0] - 0.5, path[:, 1] - 0.5, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-            pressure = hand.fill_gaps(pressure[:, 0])
-            strokes.append(hand.stroke(path * scene.cell_mm, leg, pressure, box.names[k], tip, coat.name, style, rng))
+        paths = hatching.hatch(wants[k], tangent, scene.coherence, how, rng)
+        strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, coat.name, style, rng)
     return strokes

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .hand import Paths
 from .jit import kernel
 
 Floats = NDArray[np.float32]
@@ -144,14 +145,10 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
     return strokes
 
 
-def hatch(
-    want: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator
-) -> list[tuple[Floats, NDArray[np.int32]]]:
-    """Zigzags over want > 0: a list of paths (n, 2) in work cells with the number of the leg at each point."""
+def hatch(want: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator) -> Paths:
+    """Zigzags over want > 0, whose values are the pressure; paths in work cells."""
     h, w = want.shape
     seeds = _seeds(want, how, rng)
-    if not len(seeds):
-        return []
     stamp = np.zeros((h * FINE, w * FINE), np.uint8)
     length = float((want > 0).sum()) / how.spacing
     points = np.empty((int(3 * length / STEP) + 20000, 2), np.float32)
@@ -161,7 +158,19 @@ def hatch(
     numbers = [np.float32(v) for v in (how.spacing, how.shortest, how.reach)]
     strokes = _hatch(want, tangent, coherence, seeds, luck, *numbers, how.legs, np.float32(how.gap),
                      np.float32(how.single), np.float32(STEP), FINE, stamp, points, first, leg_of)  # fmt: skip
-    return [(points[first[i] : first[i + 1]].copy(), leg_of[first[i] : first[i + 1]].copy()) for i in range(strokes)]
+    first = first[: strokes + 1]
+    points = points[: first[-1]]
+    pressure = want[points[:, 1].astype(np.int64), points[:, 0].astype(np.int64)]
+    return Paths(points, _carried_over(pressure), leg_of[: first[-1]], first)
+
+
+def _carried_over(pressure: Floats) -> Floats:
+    """Where a line crosses ground that wants none, the pressure it had before (or finds after)."""
+    known = np.where(pressure > 0, np.arange(len(pressure)), -1)
+    before = np.maximum.accumulate(known)
+    if before.size and before[0] < 0:
+        before[before < 0] = int(np.argmax(pressure > 0))
+    return pressure[before]
 
 
 def _seeds(want: Floats, how: Hatch, rng: np.random.Generator) -> Floats:

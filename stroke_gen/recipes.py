@@ -19,6 +19,8 @@ TONE = 0.45  # weight of lightness when colours are grouped
 SAMPLES = 40  # colours by which a group is judged
 GRAIN_PRICE = 0.35  # OKLab units per unit of grain
 LAYER_PRICE = 0.008  # for the second crayon
+LIKE = 0.07  # OKLab distance within which groups are alike
+AGREEMENT = 0.04  # what sharing both crayons with all groups alike is worth
 RIVAL = 0.015  # a base this little dearer lies between the lines of the first
 
 
@@ -97,7 +99,7 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
            np.float32(GRAIN_PRICE), np.float32(LAYER_PRICE), cost)  # fmt: skip
     allowed = _box(cost, pairs, size / size.sum(), count, most)
     cost[:, ~(allowed[pairs[:, 0]] & allowed[pairs[:, 1]])] = 9
-    best = cost.argmin(1)
+    best = _agree(cost, pairs, centres)
     base, shade = pairs[best].T
     return Recipes(centres, base, shade, _rivals(cost, pairs, base, shade))
 
@@ -147,6 +149,19 @@ def _box(cost: Floats, pairs: NDArray[np.int64], weight: NDArray[np.float64], co
             rest = usable & (pairs != k).all(1)
             without.append((np.where(rest, cost, 9).min(1) * weight).sum())
         allowed[used[int(np.argmin(without))]] = False
+
+
+def _agree(cost: Floats, pairs: NDArray[np.int64], centres: Floats) -> NDArray[np.int64]:
+    """The pair of each group, where like groups would rather share crayons than have the very best."""
+    best = cost.argmin(1)
+    gap = ((centres[:, None] - centres[None]) ** 2).sum(2)
+    near = np.exp(-gap / (2 * LIKE**2)) * (1 - np.eye(len(centres)))
+    near /= np.maximum(near.sum(1, keepdims=True), 1.0)
+    for _ in range(4):
+        for g in range(len(centres)):
+            shared = [np.isin(pairs, pairs[best[o]]).mean(1) * near[g, o] for o in range(len(centres)) if near[g, o] > 0.02]
+            best[g] = int((cost[g] - AGREEMENT * sum(shared, np.zeros(len(pairs)))).argmin())
+    return best
 
 
 def _rivals(cost: Floats, pairs: NDArray[np.int64], base: NDArray[np.int64], shade: NDArray[np.int64]) -> NDArray[np.int64]:

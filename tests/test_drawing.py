@@ -5,6 +5,7 @@ import io
 import json
 import os
 import time
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +129,15 @@ def test_twenty_thousand_strokes_are_quick(tmp_path: Path) -> None:
     load_drawing(tmp_path / "a.json")
     assert saved - start < 3
     assert time.process_time() - saved < 4
+
+
+def test_paths_are_packed_while_the_file_is_read(tmp_path: Path) -> None:
+    save_drawing(drawing(*[stroke(100, i) for i in range(500)]), tmp_path / "a.json")
+    tracemalloc.start()
+    load_drawing(tmp_path / "a.json")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 6 * (tmp_path / "a.json").stat().st_size
 
 
 # ---- written by hand -------------------------------------------------------------------------------------
@@ -274,7 +284,7 @@ def test_file_that_is_no_drawing_is_named_in_one_line(tmp_path: Path, content: b
 
 
 def test_missing_file_and_folder_are_named(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="none.json: cannot be read"):
+    with pytest.raises(ValueError, match=r"none\.json: cannot be read"):
         load_drawing(tmp_path / "none.json")
     with pytest.raises(ValueError, match="cannot be read"):
         load_drawing(tmp_path)

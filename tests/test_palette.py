@@ -24,10 +24,10 @@ from crayonize.palette import (
 DATA = Path(load_palette.__code__.co_filename).parent / "data" / "palettes"
 NAMES = [name for name, _, _ in palette_names()]
 BOXES = ["box8", "box16", "box24", "box48", "box64"]
-BRANDS = """crayola, tickle me, bluetiful, macaroni, granny smith, timberwolf, tumbleweed, mauvelous,
-razzmatazz, cerulean, dandelion, purple mountain, inchworm, jazzberry, manatee, fuzzy wuzzy, outer space, laser lemon,
-screamin, atomic, robin, pacific blue, wild strawberry, bittersweet, asparagus, carnation, cadet, wisteria,
-shamrock, cornflower"""
+BRANDS = """crayola, tickle me, bluetiful, macaroni, granny smith, timberwolf, tumbleweed, mauvelous, robin,
+razzmatazz, cerulean, dandelion, purple mountain, inchworm, jazzberry, manatee, fuzzy wuzzy, outer space,
+laser lemon, screamin, atomic, pacific blue, wild strawberry, bittersweet, asparagus, carnation, cadet,
+wisteria, shamrock, cornflower"""
 
 
 def linear(value: float) -> float:
@@ -59,7 +59,7 @@ def over(crayon: Crayon, thickness_um: float, ground: float) -> list[float]:
 
 
 def test_listing_names_every_file_with_title_and_size() -> None:
-    assert NAMES == [*BOXES, "earths", "greys", "pastels", "rudolf2003", "skin"]
+    assert [*BOXES, "earths", "greys", "pastels", "rudolf2003", "skin"] == NAMES
     for name, title, count in palette_names():
         palette = load_palette(name)
         assert (palette.name, palette.title, len(palette.crayons)) == (name, title, count)
@@ -107,8 +107,8 @@ def test_split_film_looks_like_one_film(split: int) -> None:
     crayon = load_palette("box24").crayons[0]
     ground = [0.9, 0.9, 0.9]
     for _ in range(split):
-        ground = [over(crayon, 9.0 / split, g)[c] for c, g in enumerate(ground)]
-    assert ground == pytest.approx(over(crayon, 9.0, 0.9), rel=1e-12)
+        ground = [over(crayon, 12.0 / split, g)[c] for c, g in enumerate(ground)]
+    assert ground == pytest.approx(over(crayon, 12.0, 0.9), rel=1e-12)
 
 
 def test_default_box_can_draw_a_photo() -> None:
@@ -143,11 +143,11 @@ def test_paper_palette_holds_table_2() -> None:
 
 
 def test_table_2_layer_has_its_transmittance_and_reflectance() -> None:
-    red = load_palette("rudolf2003").crayons[0]
-    tint = linear(0.95)
-    assert over(red, 18.0, 0.0)[0] == pytest.approx(0.051 * tint)
+    palette = load_palette("rudolf2003")
+    red, layer_um, tint = palette.crayons[0], 2 * palette.film_um, linear(0.95)
+    assert over(red, layer_um, 0.0)[0] == pytest.approx(0.051 * tint)
     r, t = 0.051 * tint, 0.605 * tint
-    assert over(red, 18.0, 1.0)[0] == pytest.approx(r + t * t / (1 - r))
+    assert over(red, layer_um, 1.0)[0] == pytest.approx(r + t * t / (1 - r))
 
 
 def test_listing_and_loading_need_no_numpy() -> None:
@@ -209,8 +209,8 @@ def test_hiding_is_guessed_from_lightness_and_chroma() -> None:
     assert default_hiding("#ffffff") == pytest.approx(0.7, abs=1e-3)
     assert default_hiding("#ff0000") == 0.12
     assert default_hiding("#ffc0cb") > default_hiding("#00a050") > default_hiding("#df2a33")
-    guessed = load_palette("#00a050").crayons[0]
-    black, white = over(guessed, 9.0, 0.0), over(guessed, 9.0, 1.0)
+    palette = load_palette("#00a050")
+    black, white = (over(palette.crayons[0], palette.film_um, ground) for ground in (0.0, 1.0))
     assert black[1] / white[1] == pytest.approx(default_hiding("#00a050"))
 
 
@@ -253,6 +253,8 @@ BAD_FILES = [
      'crayons[1].name: a second crayon "red"'),
     ("a.json", '{"film_um": 0, "crayons": [{"hex": "#ff0000"}]}', "film_um: 0 is not a number from 0.1"),
     ("a.json", '{"film_um": "9", "crayons": [{"hex": "#ff0000"}]}', 'film_um: "9" is not a number'),
+    ("a.json", '{"film_um": true, "crayons": [{"hex": "#ff0000"}]}', "film_um: true is not a number"),
+    ("a.json", '{"layer_films": 11, "crayons": [{}]}', "layer_films: 11 is not a number from 0.1 to 10"),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0], "t": 0.5, "s": 0.1}', "rgb: a list is not a list"),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 2], "t": 0.5, "s": 0.1}', "rgb[2]: 2 is not a number"),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 0], "t": 0.5}', 'crayons[0]: "s" is missing'),

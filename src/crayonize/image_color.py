@@ -74,7 +74,7 @@ def lineariser(
 
 
 def decode_srgb(encoded: NDArray[Any]) -> NDArray[np.float32]:
-    """Undo the sRGB curve (IEC 61966-2-1): uint8, uint16 or float 0..1, any shape -> linear float32 in [0, 1]."""
+    """Undo the sRGB curve (IEC 61966-2-1): uint8, uint16 or float 0..1, any shape -> linear float32."""
     encoded = np.asarray(encoded)
     full = float(np.iinfo(encoded.dtype).max) if encoded.dtype.kind == "u" else 1.0
     return lineariser(SRGB, 1, encoded.dtype, full)(encoded)
@@ -84,7 +84,7 @@ def decode_srgb(encoded: NDArray[Any]) -> NDArray[np.float32]:
 def _encoding_tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """(the code at the lower end of each bin, the light from which each code gives way to the next)."""
     edges = np.append(_srgb_curve((np.arange(255) + 0.5) / 255), np.inf).astype(np.float32)
-    # A hundredth below the bin, as rounding may put a value into the bin above its own; the edge test mends it.
+    # A hundredth below the bin, as rounding may put a value into the bin above; the edge test mends it.
     low = np.searchsorted(edges, (np.arange(_BINS + 1) - 0.01) / _BINS, side="right")
     return low.astype(np.uint8), edges
 

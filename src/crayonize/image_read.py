@@ -71,7 +71,7 @@ def read_linear(
 
 @contextmanager
 def open_picture(path: str | os.PathLike[str]) -> Iterator[tuple[Image.Image, IO[bytes]]]:
-    """Open a picture by our own handle, header only: (Pillow image, file). ValueErrors inside get its name."""
+    """Open a picture by our own handle, header only: (Pillow image, file). Names itself in ValueErrors."""
     with _named(shown(path)), _opened(path) as file:
         picture = _identify(file)
         check_size(picture.width, picture.height)
@@ -134,7 +134,7 @@ def _open_heic(file: IO[bytes]) -> Image.Image:
 
 
 def _open_unlimited(file: IO[bytes], formats: tuple[str, ...]) -> Image.Image:
-    """Image.open without Pillow's global limit (a warning at 89, an end at 179 million): check_size is ours."""
+    """Image.open without Pillow's global limit (warning at 89, end at 179 million); ours is check_size."""
     file.seek(0)
     with _pillow_limit, damage_named():
         before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None

@@ -50,7 +50,7 @@ def check_size(width: int, height: int) -> None:
 
 @contextmanager
 def damage_named() -> Iterator[None]:
-    """Damaged files raise nearly anything inside Pillow (OSError, SyntaxError, KeyError): make it one line."""
+    """Damaged files raise nearly anything inside Pillow (OSError, SyntaxError, KeyError ...)."""
     try:
         yield
     except (MemoryError, UnidentifiedImageError):
@@ -94,7 +94,7 @@ def exif_tag(picture: Image.Image, number: int) -> Any:
     """A tag of the first EXIF folder, None if it is not there or cannot be read."""
     try:
         return picture.getexif().get(number)
-    except Exception:  # noqa: BLE001  broken EXIF raises nearly anything, and the picture itself may be whole
+    except Exception:  # broken EXIF raises nearly anything, and the picture itself may be whole
         return None
 
 
@@ -113,12 +113,12 @@ def _mode_wanted(picture: Image.Image) -> str:
 
 
 def _color_management(picture: Image.Image) -> tuple[Light, ImageCms.ImageCmsTransform | None]:
-    """What the embedded profile asks for: curves and primaries, or LittleCMS to sRGB; broken means sRGB."""
+    """What the embedded profile asks for: curves and primaries, or tables by LittleCMS; broken is sRGB."""
     profile = picture.info.get("icc_profile") or b""
     in_inks = picture.mode in ("CMYK", "LAB")
     light = None if in_inks else light_from_profile(profile)
     mode = picture.mode if in_inks else _mode_wanted(picture)
-    if light is not None or mode == "LA" or not (profile or mode == "LAB"):
+    if light is not None or mode == "LA" or (b"A2B0" not in profile and mode != "LAB"):
         return light or SRGB, None
     try:
         return SRGB, ImageCms.buildTransform(

@@ -70,7 +70,7 @@ def same_file(a: str | os.PathLike[str], b: str | os.PathLike[str]) -> bool:
 
 
 def read_settings(path: str | os.PathLike[str]) -> Settings:
-    """The settings that write_image stored in a picture, empty if there are none; ValueError for no picture."""
+    """The settings write_image stored in a picture, empty if there are none; ValueError if no picture."""
     with open_picture(path) as (picture, _):
         text = picture.info.get(SOFTWARE) if picture.format == "PNG" else exif_tag(picture, _EXIF_DESCRIPTION)
     try:
@@ -163,7 +163,7 @@ def _srgb_profile() -> bytes:
 
 
 def _put(target: Path, data: BytesIO) -> None:
-    """Bytes to disk under a name of our own in the same folder, then renamed: after a fault the old file stands."""
+    """Bytes to disk under a name of our own beside the target, then renamed: a fault leaves the old file."""
     part = target.parent / f".{SOFTWARE}-{os.getpid()}-{secrets.token_hex(4)}.part"
     try:
         with open(part, "xb") as file:

@@ -4,7 +4,7 @@ A crayon is given by the colour it shows on white paper under a film of referenc
 by its hiding: the share of that colour it still shows on black. Those two colours fix its Kubelka-Munk
 absorption k and scattering s per micrometre (Curtis et al. 1997, "Computer-generated watercolor"). The
 crayons of the 2003 wax-crayon paper come as in its Table 2 instead: a colour, and the transmittance t and
-reflectance s of one layer.
+reflectance s of a layer that is `layer_films` such films thick.
 
 No numpy here: the command line lists palettes without waiting for it.
 """
@@ -33,7 +33,7 @@ _MAX_NAME = 60
 # A crayon is never perfectly black or white in any channel; the inversion needs colours strictly between.
 _DARKEST, _LIGHTEST = 0.005, 0.985
 
-_PALETTE_KEYS = ("name", "title", "source", "film_um", "layer_um", "crayons")
+_PALETTE_KEYS = ("name", "title", "source", "film_um", "layer_films", "crayons")
 _COLOUR_KEYS = ("name", "hex", "hiding")
 _LAYER_KEYS = ("name", "rgb", "t", "s", "table2")
 
@@ -200,7 +200,7 @@ def _from_object(data: dict[str, Any], where: str, stem: str) -> Palette:
     crayons = _as(list, data.get("crayons"), f"{where}: crayons", 'a list like [{"hex": "#ff0000"}]')
     _check_count(len(crayons), where)
     film_um = _number(data.get("film_um", _DEFAULT_FILM_UM), 0.1, 200.0, f"{where}: film_um")
-    layer_um = _number(data.get("layer_um", film_um), 0.1, 200.0, f"{where}: layer_um")
+    layer_um = film_um * _number(data.get("layer_films", 1.0), 0.1, 10.0, f"{where}: layer_films")
     name = _label(data["name"], f"{where}: name") if "name" in data else stem
     made = [_crayon(one, film_um, layer_um, f"{where}: crayons[{i}]") for i, one in enumerate(crayons)]
     places = [f"{where}: crayons[{i}].name" for i in range(len(made))]

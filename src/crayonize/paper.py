@@ -6,6 +6,7 @@ patch is made by convolution in the frequency domain and laid side by side over 
 
 import functools
 import os
+import re
 import tomllib
 from dataclasses import dataclass, fields, replace
 from importlib import resources
@@ -50,6 +51,8 @@ def load_paper(spec: "str | dict[str, Any] | Paper") -> Paper:
                 raise ValueError(f"paper.{key}: unknown key{did_you_mean(key, known)}")
         base = load_paper(str(spec.get("name", "drawing")))
         return _checked(replace(base, **spec))
+    if not isinstance(spec, str):
+        raise ValueError(f"paper: {spec!r} is neither a name nor a table")
     name, _, colour = spec.partition(":#")
     if name in papers():
         base = papers()[name]
@@ -60,6 +63,12 @@ def load_paper(spec: "str | dict[str, Any] | Paper") -> Paper:
 
 
 def _checked(paper: Paper) -> Paper:
+    for key in ("name", "title", "texture", "colour"):
+        if not isinstance(getattr(paper, key), str):
+            raise ValueError(f"paper.{key}: {getattr(paper, key)!r} is not a text")
+    if paper.texture not in _TEXTURES and not os.path.isfile(paper.texture):
+        kinds = ", ".join(_TEXTURES)
+        raise ValueError(f"paper.texture: {paper.texture!r} is neither one of {kinds} nor a picture file")
     for key, low, high in (("wavelength_mm", 0.0, 20.0), ("depth_um", 0.0, 1000.0), ("pits", 0.2, 8.0)):
         value = getattr(paper, key)
         if not isinstance(value, int | float) or not low <= value <= high:
@@ -70,20 +79,17 @@ def _checked(paper: Paper) -> Paper:
 
 def colour_linear(colour: str) -> tuple[float, float, float]:
     """Linear RGB of '#rrggbb'."""
+    if not re.fullmatch("#?[0-9a-fA-F]{6}", colour):
+        raise ValueError(f"colour: {colour!r} is not #rrggbb")
     digits = colour.removeprefix("#")
-    try:
-        if len(digits) != 6:
-            raise ValueError
-        code = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    except ValueError:
-        raise ValueError(f"colour: {colour!r} is not #rrggbb") from None
+    code = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in code)
     return r, g, b
 
 
 def tooth(paper: Paper, rows: int, cols: int, cell_mm: float, seed: int) -> NDArray[np.float32]:
     """Height field (rows, cols) in um of a paper on cells of `cell_mm`."""
-    if paper.texture not in ("lunar", "stipple", "felt"):
+    if paper.texture not in _TEXTURES:
         return _from_picture(paper, rows, cols)
     shape = (min(PATCH, _even(rows)), min(PATCH, _even(cols)))
     rng = np.random.default_rng([seed, 7])
@@ -141,11 +147,12 @@ def _arc(radius: float, width: float) -> NDArray[np.float32]:
 
 def _stipple(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> NDArray[np.float32]:
     """Uniform noise whose amplitude a tiled mask of dots scales (Fig. 1, right)."""
-    period = max(round(4 * wavelength), 3)
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    odd = (y // period) % 2
-    dx, dy = (x + odd * (period // 2)) % period - (period - 1) / 2, y % period - (period - 1) / 2
-    dots = np.clip(1.35 - 2.6 * np.hypot(dx, dy) / period, 0, 1)
+    down = 2 * max(round(shape[0] / (8 * wavelength)), 1)  # whole dots and pairs of rows, so that patches join
+    along = max(round(shape[1] / (4 * wavelength)), 1)
+    y, x = np.mgrid[: shape[0], : shape[1]] + 0.5
+    y, x = y * (down / shape[0]), x * (along / shape[1])
+    dx, dy = (x + (y // 1 % 2) / 2) % 1 - 0.5, y % 1 - 0.5
+    dots = np.clip(1.35 - 2.6 * np.hypot(dx, dy), 0, 1)
     return (dots * (0.35 + 0.65 * rng.random(shape))).astype(np.float32)
 
 

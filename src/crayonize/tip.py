@@ -56,7 +56,7 @@ def _profile(
     if tip.kind == "rim":  # the worn back end: one side of a ring touches, the hollow stays above
         return (radius - 0.75) ** 2 * 4 + 0.6 * (1 - along), (radius <= 1) & (radius > 0.35) & (along > -0.3)
     breadth = max(SIDE_MM / tip.width_mm, 1e-3)
-    return (across / breadth) ** 2 * 4, (np.abs(across) <= breadth / 2) & (np.abs(along) <= 1)
+    return (across / breadth) ** 2, (np.abs(across) <= breadth) & (np.abs(along) <= 1)
 
 
 def _bumps(n: int, wavelength: float, rng: np.random.Generator) -> NDArray[np.float64]:

@@ -274,7 +274,7 @@ def _deposit(contacts, touch, over, surface, side, home, cols, vx, vy, push, rat
     else:
         ahead, aside, slant = sy * side, sx + sy * side, abs(ax)
     length2 = np.float32(1) + slant * slant
-    press = np.sqrt(length2) / np.sqrt(length2 + push * push)
+    press, push = 1 / np.sqrt(1 + push * push), push * np.sqrt(length2)
     lost = np.float32(0)
     for t in range(contacts):
         at = touch[t]

@@ -1,0 +1,243 @@
+"""Slow, obvious twins of the wax and light kernels, for tests to compare with.
+
+A sheet here is a dictionary from (row, col) to a `Column` of plain Python numbers; every step goes over cells
+one by one, in the order and the words of the paper (Figs. 3, 4, 6 and 7), in double precision.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from crayonize.wax import LAYERS, THIN_UM, Sheet
+
+NEIGHBOURS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
+
+
+@dataclass
+class Column:
+    """Paper at the bottom, then a blend of old wax, then pure layers [crayon, um], top last."""
+
+    paper: float
+    layers: list[list] = field(default_factory=list)
+    blend: np.ndarray = field(default_factory=lambda: np.zeros(7))  # sums of h, k h (rgb), s h (rgb)
+
+    def wax(self) -> float:
+        return float(self.blend[0]) + sum(height for _, height in self.layers)
+
+    def top(self) -> float:
+        return self.paper + self.wax()
+
+
+def columns_of(sheet: Sheet) -> dict[tuple[int, int], Column]:
+    """A sheet as columns."""
+    made = {}
+    for cell in range(sheet.rows * sheet.cols):
+        layers = [[int(sheet.crayon[cell, j]), float(sheet.layer[cell, j])] for j in range(sheet.count[cell])]
+        column = Column(float(sheet.paper[cell]), layers, sheet.blend[cell].astype(float))
+        made[divmod(cell, sheet.cols)] = column
+    return made
+
+
+def add(column: Column, crayon: int, height: float, optics: np.ndarray, thin: float = THIN_UM) -> None:
+    """Lay wax on a column; below films thinner than `thin` it still finds its own colour."""
+    for layer in reversed(column.layers):
+        if layer[0] == crayon:
+            layer[1] += height
+            return
+        if layer[1] >= thin:
+            break
+    column.layers.append([crayon, height])
+    if len(column.layers) > LAYERS:
+        low, sunk = column.layers.pop(0)
+        column.blend += sunk * np.array([1, *optics[low]])
+
+
+def take(column: Column, height: float) -> tuple[list[list], np.ndarray]:
+    """Lift the topmost `height` off a column: pure layers, topmost first, and a share of the blend."""
+    lifted = []
+    while column.layers and height > 0:
+        crayon, there = column.layers[-1]
+        part = min(height, there)
+        lifted.append([crayon, part])
+        height -= part
+        if part < there:
+            column.layers[-1][1] -= part
+        else:
+            column.layers.pop()
+    share = min(1.0, height / column.blend[0]) if column.blend[0] > 0 else 0.0
+    from_blend = share * column.blend
+    column.blend = column.blend - from_blend
+    return lifted, from_blend
+
+
+def balance(gaps: list[float], wanted: float) -> float:
+    """Height of the tip at which the overlaps sum to `wanted` (Fig. 4), by bisection."""
+    low, high = max(gaps) - wanted, max(gaps)
+    for _ in range(100):
+        middle = (low + high) / 2
+        if sum(max(0.0, gap - middle) for gap in gaps) > wanted:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics):
+    """Fig. 7 for all cells in contact at once; changes `over`, returns what the crayon's own wax adds where."""
+    own, others, blends = {}, [], []
+    for (y, x), overlap in over.items():
+        standing = min(columns[y, x].wax(), overlap)
+        if standing <= 1e-3:
+            continue
+        weight = {}
+        for dy, dx in NEIGHBOURS:
+            if (y + dy, x + dx) in columns:
+                distance = math.hypot(dy, dx)
+                cosine = (dx * direction[0] + dy * direction[1]) / distance
+                pull = (alpha * (tops[y, x] - tops[y + dy, x + dx]) + beta * cosine) / distance
+                weight[y + dy, x + dx] = max(0.0, pull)
+        if not sum(weight.values()):
+            continue
+        over[y, x] -= nu * standing
+        lifted, from_blend = take(columns[y, x], nu * standing)
+        for to, w in weight.items():
+            share = w / sum(weight.values())
+            for crayon, height in lifted:
+                if crayon == wax:
+                    own[to] = own.get(to, 0.0) + share * height
+                elif share > 0:
+                    others.append((to, crayon, share * height))
+            blends.append((to, share * from_blend))
+    for to, crayon, height in others:
+        add(columns[to], crayon, height, optics)
+    for to, part in blends:
+        columns[to].blend = columns[to].blend + part
+    return own
+
+
+def height_ahead(tops, y, x, direction) -> tuple[float, float]:
+    """Rise of the surface one cell ahead along the longer axis (0 at the sheet's edge), and that way's length."""
+    longest = max(abs(direction[0]), abs(direction[1]))
+    ax, ay = direction[0] / longest, direction[1] / longest
+    rise = 0.0
+    for j in {math.floor(y + ay), math.ceil(y + ay)}:
+        for i in {math.floor(x + ax), math.ceil(x + ax)}:
+            share = (1 - abs(y + ay - j)) * (1 - abs(x + ax - i))
+            if (j, i) not in tops:
+                return 0.0, math.hypot(ax, ay)
+            rise += share * (tops[j, i] - tops[y, x])
+    return rise, math.hypot(ax, ay)
+
+
+def deposit(columns, over, tops, direction, own, mask, push, rate, film, mu_paper, mu_wax, relief, wear):
+    """Fig. 6 for all cells in contact: what breaks off joins `own` and wears `mask`; returns the loss."""
+    lost = 0.0
+    for cell, overlap in over.items():
+        room = overlap + own.get(cell, 0.0)
+        rise, way = height_ahead(tops, *cell, direction)
+        sine = math.sin(math.atan2(relief * rise, way) + math.atan2(push, 1))
+        if sine <= 0 or room <= 0:
+            continue
+        bare = film / (film + columns[cell].wax() + own.get(cell, 0.0))
+        mu = bare * mu_paper + (1 - bare) * mu_wax
+        given = min(rate * mu * sine, 1.0) * room
+        own[cell] = own.get(cell, 0.0) + given
+        mask[cell] += wear * given
+        lost += given
+    return lost
+
+
+def under_tip(columns, mask, top, left):
+    """Gap between sheet and mask for the present cells of a tip that lie on the sheet."""
+    return {
+        (top + j, left + i): columns[top + j, left + i].top() - float(mask[j, i])
+        for j, i in np.ndindex(mask.shape)
+        if mask[j, i] < 1e8 and (top + j, left + i) in columns
+    }
+
+
+def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, optics):
+    """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
+    mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _ = (float(c) for c in constants)
+    points, mask = points.astype(float), mask.astype(float)
+    side = mask.shape[0]
+    ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    walked = np.append(0.0, np.cumsum(ways))
+    steps = max(1, int(walked[-1] / max(1.0, step_cells * (side - 2)) + 0.5))
+    stride = max(walked[-1] / steps, 0.04 * (side - 2))
+    given, contact = 0.0, 0
+    for n in range(steps):
+        along = (n + 0.5) * walked[-1] / steps
+        x, y, force = (float(np.interp(along, walked, points[:, c])) for c in range(3))
+        segment = int(np.searchsorted(walked[1:-1], along))
+        moving = len(ways) > 0 and ways[segment] > 0
+        direction = (points[segment + 1, :2] - points[segment, :2]) / ways[segment] if moving else (1.0, 0.0)
+        if force <= 0:
+            continue
+        dither_x, dither_y = (0.5 + contact * 0.7548776662) % 1, (0.5 + contact * 0.5698402910) % 1
+        contact += 1
+        left, top = math.floor(x - 0.5 + dither_x) - side // 2, math.floor(y - 0.5 + dither_y) - side // 2
+        gaps = under_tip(columns, mask, top, left)
+        if not gaps:
+            continue
+        wanted = force * per_lambda * len(gaps) / int((mask < 1e8).sum())
+        h = balance(list(gaps.values()), wanted)
+        over = {cell: gap - h for cell, gap in gaps.items() if gap > h}
+        tops = {cell: column.top() for cell, column in columns.items()}
+        own = {}
+        if smears:
+            own = smear(columns, over, tops, direction, wax, 1 - (1 - nu) ** stride, alpha, beta, optics)
+        worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
+        given += deposit(columns, over, tops, direction, own, worn, push if push > 0 else force,
+                         rate * stride, film, mu_paper, mu_wax, relief, wear)  # fmt: skip
+        for cell, height in worn.items():
+            mask[cell[0] - top, cell[1] - left] = height
+        for cell, height in own.items():
+            if height > 0:
+                add(columns[cell], wax, height, optics)
+    return given
+
+
+def over(ground: float, kh: float, sh: float) -> float:
+    """Kubelka's layer over a ground, from the textbook form with hyperbolic functions."""
+    if sh < 1e-12:
+        return ground * math.exp(-2 * kh)
+    a = 1 + kh / sh
+    b = math.sqrt(a * a - 1)
+    if b < 1e-9:
+        r, t = sh / (1 + sh), 1 / (1 + sh)
+    else:
+        z = min(b * sh, 300.0)
+        c = a * math.sinh(z) + b * math.cosh(z)
+        r, t = math.sinh(z) / c, b / c
+    return r + t * t * ground / (1 - r * ground)
+
+
+def colour(column: Column, ground, optics: np.ndarray) -> np.ndarray:
+    """Light that comes back from a column: its layers over each other, bottom up."""
+    seen = [float(g) for g in ground]
+    layers = [column.blend[1:], *(height * optics[crayon].astype(float) for crayon, height in column.layers)]
+    for layer in layers:
+        seen = [over(seen[c], layer[c], layer[3 + c]) for c in range(3)]
+    return np.array(seen)
+
+
+def levels(points, first, reach, rows, cols, tile) -> list[int]:
+    """Level of each stroke: one more than the highest earlier stroke that shares a tile with it."""
+    done: list[tuple[set, int]] = []
+    for s in range(len(first) - 1):
+        path = points[first[s] : first[s + 1]].astype(float)[:, :2]
+        dense = [path[0]]
+        for p, q in itertools.pairwise(path):
+            parts = 1 + int(np.abs(q - p).max() / tile)
+            dense += [p + (q - p) * (i + 1) / parts for i in range(parts)]
+        tiles = set()
+        for x, y in dense:
+            for ty in range(math.floor((y - reach[s]) / tile), math.floor((y + reach[s]) / tile) + 1):
+                for tx in range(math.floor((x - reach[s]) / tile), math.floor((x + reach[s]) / tile) + 1):
+                    if 0 <= ty < -(-rows // tile) and 0 <= tx < -(-cols // tile):
+                        tiles.add((ty, tx))
+        done.append((tiles, max((level + 1 for before, level in done if before & tiles), default=0)))
+    return [level for _, level in done]
