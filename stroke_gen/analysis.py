@@ -16,6 +16,7 @@ from .swatches import Swatches
 
 Floats = NDArray[np.float32]
 WORK_LONG = 640  # cells along the work grid's long side
+WARM = np.deg2rad(58)  # OKLab hue of skin
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +125,8 @@ def tone_map(scene: Scene, swatches: Swatches, style: Style) -> Scene:
     low, high = np.percentile(lab[..., 0], (0.5, 99.5))
     low, high = min(float(low), darkest + 0.02), max(float(high), lightest)
     lab[..., 0] = darkest + (np.clip(lab[..., 0], low, high) - low) / max(high - low, 1e-6) * (lightest - darkest)
-    chroma = np.hypot(lab[..., 1], lab[..., 2])[..., None]
-    lab[..., 1:] *= style.chroma * (1 + style.vibrance * np.exp(-((chroma / 0.16) ** 2)))
+    chroma = np.hypot(lab[..., 1], lab[..., 2])
+    warm = np.clip((lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1)
+    shy = np.exp(-((chroma / 0.18) ** 2)) * np.clip(chroma / 0.05, 0, 1)
+    lab[..., 1:] *= (style.chroma * (1 + style.skin * warm**2 * shy))[..., None]
     return replace(scene, lab=lab, target=from_oklab(lab))

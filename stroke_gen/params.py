@@ -48,7 +48,7 @@ class Style:
     crayons: int = 16  # 1..64 most crayons taken out of the box
     recipes: int = 20  # 1..100 kinds of colour told apart
     chroma: float = 1.0  # 0..3 colourfulness asked for
-    vibrance: float = 0.5  # 0..3 more of it where the photo has little, so that skin stays skin
+    skin: float = 0.45  # 0..3 more colour for pale warm tones, so that skin stays skin
     wrist_deg: float = -50.0  # -90..90 the hand's own direction; -50 runs from lower left to upper right
     wrist: float = 0.3  # 0..100 how much the wrist counts against the form
     press: float = 1.0  # 0.1..5 factor on all forces
@@ -66,7 +66,7 @@ _RANGES = {
     "tip": (0.2, 4), "spacing": (0.3, 2), "shortest": (0.3, 20), "reach": (1, 60), "legs": (1, 60), "angle": (-90, 90),
     "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "detail": (0, 1), "dark_price": (0, 4), "tone": (0, 4),
     "soften": (0, 4), "gap": (0, 4), "single": (0, 1),
-    "tip_mm": (0.5, 30), "crayons": (1, 64), "recipes": (1, 100), "chroma": (0, 3), "vibrance": (0, 3), "wrist_deg": (-90, 90), "wrist": (0, 100),
+    "tip_mm": (0.5, 30), "crayons": (1, 64), "recipes": (1, 100), "chroma": (0, 3), "skin": (0, 3), "wrist_deg": (-90, 90), "wrist": (0, 100),
     "press": (0.1, 5), "force_spread": (0, 1), "swell": (0, 1), "wobble": (0, 1), "overshoot": (0, 3), "lines": (0, 5),
     "line_tip": (0.2, 3), "line_press": (0.1, 5),
 }  # fmt: skip

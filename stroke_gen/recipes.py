@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .colour import TO_LAB, TO_LMS, cube_root
+from .colour import TO_LAB, TO_LMS, cube_root, oklab
 from .jit import kernel
 from .swatches import Swatches
 
@@ -19,6 +19,7 @@ TONE = 0.45  # weight of lightness when colours are grouped
 SAMPLES = 40  # colours by which a group is judged
 GRAIN_PRICE = 0.35  # OKLab units per unit of grain
 LAYER_PRICE = 0.008  # for the second crayon
+CLASH_PRICE = 0.03  # for two crayons of unlike hue, by their distance in a and b
 LIKE = 0.07  # OKLab distance within which groups are alike
 AGREEMENT = 0.04  # what sharing both crayons with all groups alike is worth
 RIVAL = 0.015  # a base this little dearer lies between the lines of the first
@@ -42,7 +43,7 @@ _cube_root = kernel(cube_root)
 
 
 @kernel
-def _costs(sample, a, b, grain, paper, heavy, pairs, to_lms, to_lab, grain_price, layer_price, cost):  # type: ignore[no-untyped-def]
+def _costs(sample, a, b, grain, paper, heavy, pairs, extra, to_lms, to_lab, grain_price, cost):  # type: ignore[no-untyped-def]
     """Mean over samples (groups, n, 3) of the least cost over both pressures of each pair: cost (groups, pairs)."""
     groups, n = sample.shape[:2]
     pressures = grain.shape[1]
@@ -69,7 +70,7 @@ def _costs(sample, a, b, grain, paper, heavy, pairs, to_lms, to_lab, grain_price
                 s0 = _cube_root(to_lms[2, 0] * light[0] + to_lms[2, 1] * light[1] + to_lms[2, 2] * light[2])
                 for c in range(3):
                     colour[number, c] = to_lab[c, 0] * l0 + to_lab[c, 1] * m0 + to_lab[c, 2] * s0
-                price[number] = grain_price * dots + (layer_price if k1 != k2 else np.float32(0))
+                price[number] = grain_price * dots + extra[q]
                 number += 1
         for g in range(groups):
             total = np.float32(0)
@@ -95,8 +96,11 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
     pairs = np.array([(i, j) for i in range(count) for j in range(count) if i == j or light[i] > light[j]], np.int64)
     heavy = swatches.over(swatches.paper)[:, -1].sum(1)
     cost = np.empty((len(centres), len(pairs)), np.float32)
-    _costs(sample, swatches.a, swatches.b, swatches.grain, swatches.paper, heavy, pairs, TO_LMS, TO_LAB,
-           np.float32(GRAIN_PRICE), np.float32(LAYER_PRICE), cost)  # fmt: skip
+    hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
+    clash = np.linalg.norm(hues[pairs[:, 0]] - hues[pairs[:, 1]], axis=1)
+    extra = np.where(pairs[:, 0] != pairs[:, 1], LAYER_PRICE + CLASH_PRICE * clash, 0).astype(np.float32)
+    _costs(sample, swatches.a, swatches.b, swatches.grain, swatches.paper, heavy, pairs, extra, TO_LMS, TO_LAB,
+           np.float32(GRAIN_PRICE), cost)  # fmt: skip
     allowed = _box(cost, pairs, size / size.sum(), count, most)
     cost[:, ~(allowed[pairs[:, 0]] & allowed[pairs[:, 1]])] = 9
     best = _agree(cost, pairs, centres)
