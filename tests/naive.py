@@ -202,6 +202,7 @@ def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, o
 
 def over(ground: float, kh: float, sh: float) -> float:
     """Kubelka's layer over a ground, from the textbook form with hyperbolic functions."""
+    ground, kh, sh = float(ground), float(kh), float(sh)
     if sh < 1e-12:
         return ground * math.exp(-2 * kh)
     a = 1 + kh / sh

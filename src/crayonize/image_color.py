@@ -133,21 +133,19 @@ def _read_profile(profile: bytes) -> Light | None:
     if profile[36:40] != b"acsp" or connection != b"XYZ " or b"A2B0" in tags:
         return None
     if space == b"GRAY":
-        return _checked(Light((_curve(tags[b"kTRC"]),)))
+        return _simplified(Light((_curve(tags[b"kTRC"]),)))
     if space != b"RGB ":
         return None
     primaries = [struct.unpack_from(">3i", tags[name], 8) for name in (b"rXYZ", b"gXYZ", b"bXYZ")]
     to_srgb = np.linalg.solve(_SRGB_TO_XYZ, np.array(primaries).T / 65536)
     curves = tuple(_curve(tags[name]) for name in (b"rTRC", b"gTRC", b"bTRC"))
-    return _checked(Light(curves, to_srgb.astype(np.float32)))
+    return _simplified(Light(curves, to_srgb.astype(np.float32)))
 
 
-def _checked(light: Light) -> Light:
-    """The light itself; plain SRGB if the same to a tenth of an 8-bit step; ValueError if unusable."""
+def _simplified(light: Light) -> Light:
+    """The light, or plain SRGB if that is the same to a tenth of an 8-bit step. Unusable curves raise."""
     steps = np.linspace(0, 1, 256)
     ramps = np.stack([curve(steps) for curve in light.curves])
-    if not np.isfinite(ramps).all():
-        raise ValueError("the curve of the profile is not finite")
     same_primaries = light.matrix is None or np.abs(light.matrix - np.eye(3)).max() < 4e-4
     return SRGB if same_primaries and np.abs(ramps - _srgb_curve(steps)).max() < 4e-4 else light
 

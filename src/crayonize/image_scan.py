@@ -115,14 +115,13 @@ def _mode_wanted(picture: Image.Image) -> str:
 def _color_management(picture: Image.Image) -> tuple[Light, ImageCms.ImageCmsTransform | None]:
     """What the embedded profile asks for: curves and primaries, or tables by LittleCMS; broken is sRGB."""
     profile = picture.info.get("icc_profile") or b""
-    in_inks = picture.mode in ("CMYK", "LAB")
-    light = None if in_inks else light_from_profile(profile)
-    mode = picture.mode if in_inks else _mode_wanted(picture)
-    if light is not None or mode == "LA" or (b"A2B0" not in profile and mode != "LAB"):
+    mode = "CMYK" if picture.mode == "CMYK" else _mode_wanted(picture)
+    light = light_from_profile(profile)
+    if light is not None or mode == "LA" or b"A2B0" not in profile:
         return light or SRGB, None
     try:
         return SRGB, ImageCms.buildTransform(
-            ImageCms.createProfile("LAB") if mode == "LAB" else ImageCms.getOpenProfile(BytesIO(profile)),
+            ImageCms.getOpenProfile(BytesIO(profile)),
             ImageCms.createProfile("sRGB"),
             mode,
             "RGBA" if mode == "RGBA" else "RGB",
@@ -142,7 +141,7 @@ def _scan_8_bit(picture: Image.Image, transform: ImageCms.ImageCmsTransform | No
         if transform is None:
             strip = strip.convert(mode)
         else:
-            strip = strip if strip.mode in ("CMYK", "LAB") else strip.convert(mode)
+            strip = strip if strip.mode == "CMYK" else strip.convert(mode)
             strip = ImageCms.applyTransform(strip, transform) or strip
         return np.asarray(strip).reshape(bottom - top, picture.width, -1)
 

@@ -116,7 +116,7 @@ def _encode(
         raise ValueError(f"{name}: settings: {error}; they must be text or finite numbers") from error
     data, options = BytesIO(), _options(format_, text, dpi, quality)
     try:
-        Image.fromarray(np.ascontiguousarray(srgb8)).save(data, format_, **options)
+        Image.fromarray(srgb8).save(data, format_, **options)
     except ValueError as error:
         raise ValueError(f"{name}: cannot be written as {format_}: {error}") from error
     return data

@@ -5,6 +5,7 @@ layer, which follow from the sums k*h and s*h (Kubelka 1948). Splitting a layer 
 A quiet light from the upper left shades the relief of paper and wax.
 """
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -36,11 +37,11 @@ def _over(ground, kh, sh):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _render(top, bottom, cols, ground, light, paper, total, count, crayon, layer, blend, optics, out):  # type: ignore[no-untyped-def]
-    """Rows top..bottom of the picture into out (rows, cols, 3)."""
-    rows = out.shape[0]
+def _render(top, bottom, left, right, ground, light, paper, total, count, crayon, layer, blend, optics, out):  # type: ignore[no-untyped-def]
+    """Rows top..bottom and columns left..right of the picture into out (rows, cols, 3)."""
+    rows, cols = out.shape[:2]
     for y in range(top, bottom):
-        for x in range(cols):
+        for x in range(left, right):
             cell = y * cols + x
             for c in range(3):
                 out[y, x, c] = ground[c]
@@ -66,12 +67,26 @@ def render(
 ) -> NDArray[np.float32]:
     """The picture of a sheet: linear RGB (rows, cols, 3) over paper of the linear colour `ground`."""
     out = np.empty((sheet.rows, sheet.cols, 3), np.float32)
+    bands = [(top, min(top + BAND, sheet.rows), 0, sheet.cols) for top in range(0, sheet.rows, BAND)]
+    render_parts(sheet, ground, bands, out, light=light, threads=threads)
+    return out
+
+
+def render_parts(
+    sheet: Sheet,
+    ground: tuple[float, float, float],
+    parts: Sequence[tuple[int, int, int, int]],
+    out: NDArray[np.float32],
+    *,
+    light: bool = True,
+    threads: int = 1,
+) -> None:
+    """Renew parts (top, bottom, left, right; in cells) of a picture `out` that `render` gave earlier."""
     strength = np.float32(LIGHT * 0.1 / sheet.cell_mm * 0.5 if light else 0)
     base = np.array(ground, np.float32)
 
-    def band(top: int) -> None:
-        _render(top, min(top + BAND, sheet.rows), sheet.cols, base, strength, *sheet.columns(), out)
+    def part(window: tuple[int, int, int, int]) -> None:
+        _render(*window, base, strength, *sheet.columns(), out)
 
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(band, range(0, sheet.rows, BAND)))
-    return out
+        list(pool.map(part, parts))

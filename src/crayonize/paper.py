@@ -180,8 +180,9 @@ def _from_picture(paper: Paper, rows: int, cols: int) -> NDArray[np.float32]:
     """A grey picture as a height field, white high, stretched over the sheet."""
     import cv2
 
-    from .image_io import read_linear
+    from .image_read import read_linear
 
     grey = read_linear(paper.texture).mean(2)
-    fitted = cv2.resize(grey, (cols, rows), interpolation=cv2.INTER_AREA if grey.size > rows * cols else cv2.INTER_CUBIC)
+    way = cv2.INTER_AREA if grey.size > rows * cols else cv2.INTER_CUBIC
+    fitted = cv2.resize(grey, (cols, rows), interpolation=way)
     return np.ascontiguousarray(np.clip(fitted, 0, 1), np.float32) * np.float32(paper.depth_um)

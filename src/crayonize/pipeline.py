@@ -1,7 +1,7 @@
 """The two conductors: a photo becomes a Drawing, a Drawing becomes a picture."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -18,21 +18,31 @@ from .settings import Settings
 from .wax import Sheet
 
 Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
+Watch = Callable[["Easel", Sequence[Stroke], float], Iterable[Sequence[Stroke]]]
 
 
 @dataclass
 class Easel:
-    """An open sheet with its paper and crayons: strokes go on, pictures come off."""
+    """An open sheet with its paper and crayons: strokes go on, pictures come off.
+
+    watch: someone who looks on. Given strokes and their share of all that will be drawn (0..1), it hands them
+    back in slices, in order, and may look at the sheet after each.
+    """
 
     sheet: Sheet
     box: rub.Box
     ground: tuple[float, float, float]
     threads: int
     smears: bool = True
+    watch: Watch | None = None
 
-    def draw(self, strokes: Sequence[Stroke], progress: rub.Progress | None = None) -> None:
-        """Draw strokes, in order, onto what is there."""
-        rub.rub(self.sheet, strokes, self.box, threads=self.threads, smears=self.smears, progress=progress)
+    def draw(self, strokes: Sequence[Stroke], progress: rub.Progress | None = None, share: float = 1.0) -> None:
+        """Draw strokes, in order, onto what is there; slices give the same sheet, bit for bit."""
+        drawn = 0
+        for part in self.watch(self, strokes, share) if self.watch else [strokes]:
+            report = progress and (lambda n, _, before=drawn: progress(before + n, len(strokes)))
+            rub.rub(self.sheet, part, self.box, threads=self.threads, smears=self.smears, progress=report)
+            drawn += len(part)
 
     def picture(self, light: bool = True) -> NDArray[np.float32]:
         """The sheet as linear RGB (rows, cols, 3)."""
@@ -65,17 +75,21 @@ def draw(
     preview: bool = False,
     light: bool = True,
     progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> Easel:
     """A drawing on paper, `size` cells along the long side; `.picture()` shows it.
 
     preview: without smearing and at half the size (section 5 of the paper).
     """
     stand = easel(drawing, max(1, size // 2) if preview else size, threads, smears=not preview)
+    stand.watch = watch
     stand.draw(drawing.strokes, progress and (lambda done, all_: progress("drawing", done / all_)))
     return stand
 
 
-def sketch(photo: NDArray[np.float32], settings: Settings, progress: Progress | None = None) -> tuple[Drawing, Easel]:
+def sketch(
+    photo: NDArray[np.float32], settings: Settings, progress: Progress | None = None, watch: Watch | None = None
+) -> tuple[Drawing, Easel]:
     """Plan and draw a photo in linear light (h, w, 3): its Drawing and the sheet it was drawn on."""
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
@@ -84,6 +98,8 @@ def sketch(photo: NDArray[np.float32], settings: Settings, progress: Progress | 
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
     stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
                   smears=not settings.preview)  # fmt: skip
+    stand.watch = watch
+    stand.draw([], share=0)  # whoever looks on sees the bare sheet
     table = calibration.swatches(stand.box.palette, paper.load_paper(settings.paper), settings.physics, stand.threads)
     stages = len(style.passes) + 1
     done = 0
@@ -93,7 +109,7 @@ def sketch(photo: NDArray[np.float32], settings: Settings, progress: Progress | 
         if strokes:
             base = done / stages
             name = strokes[0].note
-            stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)))
+            stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
         done += 1
         return cv2.resize(stand.picture(light=False), shape[::-1], interpolation=cv2.INTER_AREA)
 

@@ -28,8 +28,9 @@ def _levels(points, first, reach, tiles_y, tiles_x, tile, level):  # type: ignor
             for p in range(parts):
                 t = (p + 1) / parts
                 x, y = points[j, 0] + t * dx, points[j, 1] + t * dy
-                for ty in range(max(0, int((y - reach[s]) // tile)), min(tiles_y - 1, int((y + reach[s]) // tile)) + 1):
-                    for tx in range(max(0, int((x - reach[s]) // tile)), min(tiles_x - 1, int((x + reach[s]) // tile)) + 1):
+                top, left = max(0, int((y - reach[s]) // tile)), max(0, int((x - reach[s]) // tile))
+                for ty in range(top, min(tiles_y - 1, int((y + reach[s]) // tile)) + 1):
+                    for tx in range(left, min(tiles_x - 1, int((x + reach[s]) // tile)) + 1):
                         if seen[ty, tx] != s:
                             seen[ty, tx] = s
                             mine[number] = ty * tiles_x + tx

@@ -39,6 +39,7 @@ def mask(tip: "Tip", cell_mm: float, worn_um: float, rng: np.random.Generator) -
     along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
     radius = np.hypot(x, y)
     rise, present = _profile(tip, along, across, radius)
+    present[n // 2, n // 2] |= not present.any()  # finer than a cell
     height = DROPS_UM[tip.kind] * rise + BUMP_UM * _bumps(n, BUMP_MM / cell_mm, rng)
     height = np.maximum(height, height[present].min() + worn_um)
     height -= height[present].min()
@@ -63,5 +64,5 @@ def _bumps(n: int, wavelength: float, rng: np.random.Generator) -> NDArray[np.fl
     """Smooth noise in [-1, 1] with the given wavelength in cells."""
     noise = rng.standard_normal((n, n)).astype(np.float32)
     sigma = max(0.3 * wavelength, 0.3)
-    smooth = cv2.GaussianBlur(noise, (0, 0), sigma, borderType=cv2.BORDER_WRAP if n > 64 else cv2.BORDER_REFLECT)
+    smooth = cv2.GaussianBlur(noise, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)
     return np.clip(smooth / (2 * smooth.std() + 1e-9), -1, 1).astype(np.float64)

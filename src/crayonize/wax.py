@@ -43,9 +43,9 @@ class Physics:
 
     def constants(self, cell_mm: float) -> Floats:
         """The kernel's arguments for cells of `cell_mm`."""
-        values = (self.mu_paper, self.mu_wax, self.film_um, self.rate_per_mm * cell_mm, self.push,
-                  self.relief / (1000 * cell_mm), 1 - (1 - self.nu) ** (cell_mm / self.nu_mm), self.alpha, self.beta, self.epsilon_um, self.wear,
-                  THIN_UM)  # fmt: skip
+        relief, nu = self.relief / (1000 * cell_mm), 1 - (1 - self.nu) ** (cell_mm / self.nu_mm)
+        values = (self.mu_paper, self.mu_wax, self.film_um, self.rate_per_mm * cell_mm, self.push, relief,
+                  nu, self.alpha, self.beta, self.epsilon_um, self.wear, THIN_UM)  # fmt: skip
         return np.array(values, np.float32)
 
 
@@ -327,8 +327,9 @@ def _rub(picked, points, first, wax_of, mask_of, masks, sides, step_cells, smear
     room = 32 * largest + 64
     blended = np.zeros((largest, blend.shape[1]), np.float32)
     moves = (np.empty(room, np.int64), np.empty(room, np.uint8), np.empty(room, np.float32), blended)
-    mu_paper, mu_wax, film, rate_cell, push, relief = constants[0], constants[1], constants[2], constants[3], constants[4], constants[5]
-    nu_cell, alpha, beta, epsilon, wear, thin = constants[6], constants[7], constants[8], constants[9], constants[10], constants[11]
+    mu_paper, mu_wax, film, rate_cell = constants[0], constants[1], constants[2], constants[3]
+    push, relief, nu_cell, alpha = constants[4], constants[5], constants[6], constants[7]
+    beta, epsilon, wear, thin = constants[8], constants[9], constants[10], constants[11]
     for s in picked:
         tip, wax = mask_of[s], wax_of[s]
         side = sides[tip]

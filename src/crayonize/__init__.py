@@ -1,0 +1,34 @@
+"""Turns a photo into a wax-crayon drawing, stroke by stroke, by simulating wax on rough paper.
+
+    from crayonize import convert, draw
+
+    convert("photo.jpg", "out.png", palette="box24", seed=1)
+
+Importing this is cheap; numpy, numba and OpenCV are loaded by the first call.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .api import convert, draw
+    from .settings import Settings
+
+__version__ = "0.1.0"
+__all__ = ["Settings", "convert", "draw"]
+
+
+def __getattr__(name: str) -> Any:
+    """The names of __all__, loaded when first used."""
+    if name in ("convert", "draw"):
+        from . import api
+
+        return getattr(api, name)
+    if name == "Settings":
+        from .settings import Settings
+
+        return Settings
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,258 @@
+"""The Python interface: a photo becomes a drawing, a Drawing becomes a picture.
+
+Importing this module is cheap; what is heavy is loaded by the first call.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from . import __version__, cache, memory
+from .did_you_mean import did_you_mean, quoted
+from .settings import Settings
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    import numpy as np
+    from numpy.typing import NDArray
+    from PIL.Image import Image
+    from stroke_gen.drawing import Drawing
+
+    from .pipeline import Easel
+
+    Photo = str | os.PathLike[str] | Image | NDArray[Any]
+
+Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
+MAX_SIZE = 20_000  # pixels along the long side
+MAX_THREADS = 256
+PHOTO_SIDE = 2048  # pixels of the photo's long side that are read: three times what the planner looks at
+STROKE_SUFFIXES = (".json",)
+_MM_PER_INCH = 25.4
+
+T = TypeVar("T")
+
+
+def convert(
+    image: Photo,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    strokes: str | os.PathLike[str] | None = None,
+    light: bool = True,
+    progress: Progress | None = None,
+    **choices: Any,
+) -> Image | NDArray[np.uint8] | Path:
+    """Draw a photo with wax crayons.
+
+    image: a path, a Pillow image, or an array as `image_read.read_linear` takes it.
+    out: where to write the drawing (PNG, JPEG, WebP or TIFF), with settings and seed inside.
+    strokes: where to save the strokes (.json), from which `draw` makes the same picture at any size.
+    light: shade the relief of paper and wax.   progress: called with a name and the share done, 0..1.
+    choices: any field of `Settings` (palette, paper, style, force, size, seed, threads, preview, focus, ...).
+
+    Returns the same kind as `image`: an array gives uint8 sRGB (h, w, 3), a Pillow image a Pillow image, a
+    path the path `out`, or a Pillow image if there is no `out`. ValueError, one line, for what the caller
+    can mend; TypeError for an unknown choice; OSError if a file cannot be written.
+    """
+    import numpy as np
+    from PIL import Image
+
+    settings = settings_of(choices)
+    check_outputs([image, *used_files(settings)], out, strokes)
+    drawing, easel = sketch(image, settings, progress)
+    picture = finish(drawing, easel, out, strokes, light=light, told=notes(settings, light))
+    if isinstance(image, np.ndarray):
+        return picture
+    if out is not None and not isinstance(image, Image.Image):
+        return Path(out)
+    return Image.fromarray(picture)
+
+
+def draw(
+    drawing: Drawing | str | os.PathLike[str],
+    size: int = Settings.size,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    preview: bool = False,
+    light: bool = True,
+    progress: Progress | None = None,
+) -> NDArray[np.uint8]:
+    """The picture of a Drawing, or of a drawing's file: uint8 sRGB (h, w, 3), `size` pixels along the long side.
+
+    preview: without smearing and at half the size. The rest, and the errors, as in `convert`.
+    """
+    drawing, easel = redraw(drawing, size, threads, preview, progress, out=out)
+    return finish(drawing, easel, out, light=light, told={"crayonize": __version__, "seed": drawing.seed})
+
+
+# ---- what the command line shares ------------------------------------------------------------------------
+
+
+def settings_of(choices: dict[str, Any]) -> Settings:
+    """Settings from keywords, checked as far as can be done without a photo."""
+    known = [field.name for field in fields(Settings)]
+    for name in choices:
+        if name not in known:
+            raise TypeError(f"there is no choice {quoted(name)}{did_you_mean(name, known)}")
+    settings = Settings(**choices)
+    _check_whole("size", settings.size, 1, MAX_SIZE)
+    _check_whole("seed", settings.seed, 0, 2**63 - 1)
+    _check_threads(settings.threads)
+    for box in settings.focus:
+        if len(box) != 4 or not all(0 <= x <= 1 for x in box):
+            raise ValueError(f"focus: {box!r} is not x, y, w, h in fractions of the picture, each from 0 to 1")
+    return settings
+
+
+def _check_whole(name: str, value: Any, low: int, high: int) -> None:
+    if type(value) is not int or not low <= value <= high:
+        raise ValueError(f"{name}: {value!r} is not a whole number from {low} to {high}")
+
+
+def _check_threads(threads: int | None) -> None:
+    if threads is not None:
+        _check_whole("threads", threads, 1, MAX_THREADS)
+
+
+def used_files(settings: Settings) -> list[str]:
+    """Palette, style and paper, where they are given as files."""
+    given = (settings.palette, settings.style, settings.paper)
+    return [source for source in given if isinstance(source, str) and Path(source).is_file()]
+
+
+def check_outputs(
+    inputs: list[Any], out: str | os.PathLike[str] | None, strokes: str | os.PathLike[str] | None = None
+) -> None:
+    """Before any work: outputs have a format and a folder, and none is an input or the other output.
+
+    ValueError for what is wrong with a path, PermissionError for a folder that may not be written to.
+    """
+    from .image_write import file_format, same_file
+
+    if out is not None:
+        file_format(out)
+    if strokes is not None and Path(strokes).suffix.lower() not in STROKE_SUFFIXES:
+        raise ValueError(f"{os.fspath(strokes)}: strokes can be saved as {', '.join(STROKE_SUFFIXES)} only")
+    taken = [path for path in inputs if isinstance(path, str | os.PathLike)]
+    for output in (out, strokes):
+        if output is None:
+            continue
+        for path in taken:
+            if same_file(path, output):
+                raise ValueError(f"{os.fspath(output)}: would be written over {os.fspath(path)}; give another name")
+        folder = Path(output).parent
+        if not folder.is_dir():
+            raise ValueError(f"{os.fspath(output)}: the folder {folder} does not exist; create it first")
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(13, "its folder may not be written to", os.fspath(output))
+        taken.append(output)
+
+
+def sketch(image: Photo, settings: Settings, progress: Progress | None = None) -> tuple[Drawing, Easel]:
+    """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
+    from . import paper
+    from .image_read import read_linear
+
+    ground = paper.colour_linear(paper.load_paper(settings.paper).colour)
+    photo = read_linear(image, PHOTO_SIDE, ground)
+    check_size(photo.shape[1], photo.shape[0], settings.size, settings.preview)
+    drawn: tuple[Drawing, Easel] = workshop().sketch(photo, settings, progress)
+    return drawn
+
+
+def redraw(
+    drawing: Drawing | str | os.PathLike[str],
+    size: int,
+    threads: int | None = None,
+    preview: bool = False,
+    progress: Progress | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+) -> tuple[Drawing, Easel]:
+    """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the sheet."""
+    from stroke_gen.drawing import Drawing, load_drawing
+
+    _check_whole("size", size, 1, MAX_SIZE)
+    _check_threads(threads)
+    check_outputs([drawing], out)
+    drawing = drawing if isinstance(drawing, Drawing) else load_drawing(drawing)
+    check_size(drawing.width_mm, drawing.height_mm, size, preview)
+    easel: Easel = workshop().draw(drawing, size, threads=threads, preview=preview, progress=progress)
+    return drawing, easel
+
+
+def check_size(width: float, height: float, size: int, preview: bool) -> None:
+    """ValueError if the sheet for a picture of these proportions does not fit into memory."""
+    cell = max(width, height) / (size / 2 if preview else size)
+    memory.check_fits(max(1, round(height / cell)), max(1, round(width / cell)))
+
+
+def finish(
+    drawing: Drawing,
+    easel: Easel,
+    out: str | os.PathLike[str] | None,
+    strokes: str | os.PathLike[str] | None = None,
+    *,
+    light: bool,
+    told: dict[str, str | int | float],
+) -> NDArray[np.uint8]:
+    """The picture as uint8 sRGB; written to `out` and its strokes to `strokes` if these are given.
+
+    told: what is written into the picture about itself.
+    """
+    from stroke_gen.drawing import save_drawing
+
+    from .image_color import encode_srgb
+    from .image_write import write_image
+
+    picture = encode_srgb(easel.picture(light))
+    if out is not None:
+        dpi = easel.sheet.cols / drawing.width_mm * _MM_PER_INCH
+        write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None)
+    if strokes is not None:
+        save_drawing(drawing, strokes)
+    return picture
+
+
+def notes(settings: Settings, light: bool) -> dict[str, str | int | float]:
+    """What is written into the picture: enough to draw it again, and no folder names."""
+
+    def short(value: Any) -> str | int | float:
+        if isinstance(value, dict):
+            return str(value.get("name", "custom"))
+        if isinstance(value, str):
+            return Path(value).name
+        return value if isinstance(value, int | float) else repr(value)
+
+    kept = replace(settings, threads=None)  # changes nothing in the picture
+    chosen = {f.name: getattr(kept, f.name) for f in fields(kept)}
+    named = {name: short(value) for name, value in chosen.items() if value not in (None, ())}
+    return {"crayonize": __version__, **named, "light": light}
+
+
+@functools.cache
+def workshop() -> ModuleType:
+    """The pipeline with all its kernels, these from the compile cache."""
+    cache.before_kernels()
+    from . import pipeline
+
+    cache.keep_kernels()
+    return pipeline
+
+
+def warm_up() -> None:
+    """Draw a tiny picture through every kernel, so that all are compiled and kept."""
+    import numpy as np
+    from stroke_gen.params import style_names
+
+    y, x = np.mgrid[:48, :64] / np.float32(48)
+    photo = np.stack([x * 0.75, y, 0.5 + 0.5 * np.sin(9 * x * y)], axis=-1)
+    for style in style_names():
+        convert(photo, style=style, size=240, sheet_mm=60.0)
+    convert(photo, size=240, sheet_mm=60.0, preview=True, light=False)

@@ -1,0 +1,82 @@
+"""What a batch is made of: the jobs, the recipe they share, and what became of each."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..settings import Settings
+
+STATUSES = ("ok", "failed", "died", "timeout", "skipped", "ignored", "not_run")
+
+MAX_PIXELS = 250_000_000
+MAX_BYTES = 1 << 30
+TIME_LIMIT = 1800.0
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A file that was found, and what tells later whether it has changed."""
+
+    name: str  # relative to its folder, parts joined by "/": how it is reported and journaled
+    source: str  # where it lies: a path or URL
+    size: int  # bytes
+    version: str  # time of its last change in ns, or what a remote folder has in its place
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One photo to be drawn."""
+
+    photo: Found
+    out: str  # name of the picture relative to the output folder
+    target: str  # where the picture goes: a path or URL
+    strange: bool = False  # something stands at the target that no journal knows
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one file."""
+
+    status: str  # one of STATUSES
+    error: str = ""  # why, in one line
+    seconds: float = 0.0
+    bytes: int = 0  # size of the picture
+    strokes: int = 0
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How every photo of a batch is drawn, and the limits under which it is opened."""
+
+    settings: Settings
+    metadata: str = "safe"
+    page: str | None = None  # sheet of paper to fill, such as "a4"; None leaves the sheet of the settings
+    dpi: float | None = None
+    max_pixels: int = MAX_PIXELS
+    max_bytes: int = MAX_BYTES
+
+    def digest(self, suffix: str) -> str:
+        """A short name for all that shapes a picture: with the same photo and digest it comes out the same.
+
+        A palette, paper or style given as a file counts with its content.
+        """
+        shaping = asdict(self.settings)
+        del shaping["threads"]
+        shaping |= {"metadata": self.metadata, "page": self.page, "dpi": self.dpi, "suffix": suffix}
+        by_name = (self.settings.palette, self.settings.paper, self.settings.style)
+        files = [Path(name) for name in by_name if isinstance(name, str) and Path(name).is_file()]
+        shaping["files"] = [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
+        return hashlib.sha256(json.dumps(shaping, sort_keys=True).encode()).hexdigest()[:20]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, for the way to a worker."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, plain: dict[str, Any]) -> "Recipe":
+        """The recipe again."""
+        settings = dict(plain["settings"])
+        settings["focus"] = tuple(tuple(box) for box in settings["focus"])
+        return cls(**{**plain, "settings": Settings(**settings)})

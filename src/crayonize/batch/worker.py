@@ -1,0 +1,119 @@
+"""A worker process: hears the recipe, then draws one photo after another until nobody listens any more.
+
+Started by the crew with two pipes. It dies with the crew: at once where the system offers that, and else when
+its pipe ends. Nothing of a photo is opened before the crew has granted the memory it will take.
+"""
+
+import contextlib
+import ctypes
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+from typing import IO, Any
+
+from .job import Found, Job, Outcome, Recipe
+
+_PR_SET_PDEATHSIG = 1
+_BUFFERS = 512 << 20  # address space that threads and allocators reserve without using it
+
+Message = dict[str, Any]
+
+
+class OutputError(Exception):
+    """No picture can be written: the disk is full, or the folder is closed to us."""
+
+
+class _Line:
+    """The two pipes to the crew."""
+
+    def __init__(self) -> None:
+        """Take the pipes away from stdin and stdout, so that no library can write into them."""
+        self._from: IO[bytes] = os.fdopen(os.dup(0), "rb")
+        self._to = os.dup(1)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        os.dup2(2, 1)
+        self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
+
+    def open(self) -> Message:
+        """The first message; from then on a thread listens, and ends the process with the pipe."""
+        first: Message = json.loads(self._from.readline())
+        threading.Thread(target=self._listen, daemon=True).start()
+        return first
+
+    def _listen(self) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            for line in self._from:
+                self._messages.put(json.loads(line))
+        os._exit(0)
+
+    def hear(self) -> Message:
+        """The next message."""
+        return self._messages.get()
+
+    def say(self, message: Message) -> None:
+        """Send a message."""
+        os.write(self._to, json.dumps(message).encode() + b"\n")
+
+    def ask_for(self, memory: int) -> bool:
+        """Ask for bytes of memory and wait; False if there will never be so much."""
+        self.say({"asks": memory})
+        return bool(self.hear()["go"])
+
+
+def main() -> None:
+    """Serve the crew at the other end of stdin and stdout."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    line = _Line()
+    hello = line.open()
+    _die_with(hello["parent"])
+    try:
+        from .picture import Studio
+
+        studio = Studio(Recipe.from_json(hello["recipe"]), hello["threads"], hello["render"])
+        _limit_memory(hello["memory"])
+    except ValueError as error:
+        return line.say({"refused": str(error)})
+    except Exception as error:  # whatever a broken installation raises
+        return line.say({"broken": f"a worker cannot start: {type(error).__name__}: {error}"})
+    line.say({"ready": os.getpid()})
+    while True:
+        plain = line.hear()["job"]
+        job = Job(**{**plain, "photo": Found(**plain["photo"])})
+        try:
+            outcome = studio.make(job, line.ask_for)
+        except OutputError as error:
+            return line.say({"broken": str(error)})
+        line.say(_message(outcome))
+
+
+def _message(outcome: Outcome) -> Message:
+    return {"status": outcome.status, "error": outcome.error, "bytes": outcome.bytes, "strokes": outcome.strokes}
+
+
+def _die_with(parent: int) -> None:
+    """Let the kernel kill us with our parent (Linux)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(0)
+
+
+def _limit_memory(most: int | None) -> None:
+    """Let a photo that takes more than all there is end in a MemoryError, not with the machine.
+
+    Set after the libraries are loaded: some crash when they are loaded under a limit.
+    """
+    if most is None or sys.platform != "linux":
+        return
+    import resource
+
+    with open("/proc/self/statm") as file:
+        now = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (now + most + _BUFFERS, resource.RLIM_INFINITY))
+
+
+if __name__ == "__main__":
+    main()
