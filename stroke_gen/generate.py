@@ -30,11 +30,12 @@ def generate(
     scene = analysis.read(photo, width_mm, height_mm, style.tip_mm, style.wrist_deg, style.wrist, focus)
     scene = analysis.tone_map(scene, swatches, style)
     plan = recipes.find(scene.lab, swatches, style.recipes, style.crayons, rng)
+    group = separation.grouped(scene.lab, plan, 0.45 * style.tip_mm / scene.cell_mm)
     strokes: list[Stroke] = []
     shape = scene.detail.shape
     now = observe([], shape)
     for coat in style.passes:
-        fresh = _coat(scene, now, swatches, plan, coat, style, rng, threads)
+        fresh = _coat(scene, group, now, swatches, plan, coat, style, rng, threads)
         strokes += fresh
         now = observe(fresh, shape)
     fresh = contours.outlines(scene, now, swatches.only(plan.crayons()), style, rng)
@@ -43,20 +44,19 @@ def generate(
 
 
 def _coat(
-    scene: Scene, now: Floats, box: Swatches, plan: Recipes, coat: Pass, style: Style, rng: np.random.Generator, threads: int
+    scene: Scene, group: NDArray[np.int64], now: Floats, box: Swatches, plan: Recipes, coat: Pass, style: Style, rng: np.random.Generator, threads: int
 ) -> list[Stroke]:  # fmt: skip
     """One coat: choose a crayon for every place, then hatch crayon by crayon, light to dark."""
     width = coat.tip * style.tip_mm
     tip = Tip("sharp" if coat.sharp else "blunt", width)
     cells = width / scene.cell_mm
     aim = oklab(analysis.blur(scene.target, coat.soften * 0.5 * cells))
-    gain, best = separation.gains(analysis.blur(now, 0.5 * cells), aim, box, coat.tone, coat.dark_price, threads)
-    streaks = separation.streaks(*aim.shape[:2], cells, style.wrist_deg, rng)
-    wants = separation.plates(gain, best, box, scene, coat, cells, plan, streaks)
+    streaks = separation.streaks(*group.shape, cells, style.wrist_deg, rng)
+    wants = separation.plates(analysis.blur(now, 0.5 * cells), aim, group, box, scene, plan, coat, cells, streaks, threads)
     tangent = analysis.turned(scene.tangent, coat.angle)
     how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single)
     strokes: list[Stroke] = []
-    for k in np.argsort(-box.lightness()):
+    for k in sorted(wants, key=lambda k: -box.lightness()[k]):
         paths = hatching.hatch(wants[k], tangent, scene.coherence, how, rng)
         strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, coat.name, style, rng)
     return strokes

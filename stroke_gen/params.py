@@ -46,7 +46,7 @@ class Style:
     title: str = ""
     tip_mm: float = 2.4  # 0.5..30 width of the usual tip
     crayons: int = 16  # 1..64 most crayons taken out of the box
-    recipes: int = 20  # 1..100 kinds of colour told apart
+    recipes: int = 30  # 1..100 kinds of colour told apart
     chroma: float = 1.0  # 0..3 colourfulness asked for
     skin: float = 0.45  # 0..3 more colour for pale warm tones, so that skin stays skin
     wrist_deg: float = -50.0  # -90..90 the hand's own direction; -50 runs from lower left to upper right

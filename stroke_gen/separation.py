@@ -20,6 +20,8 @@ from .swatches import Swatches
 
 Floats = NDArray[np.float32]
 STRANGER_PRICE = 0.015  # a free coat keeps to the recipe's crayons unless another gains this much more
+RIVAL_SHARE = 0.55  # of the streaks' deviation: above it the rival base is taken
+UNASKED = np.float32(-0.05)
 BAND = 32
 
 
@@ -27,14 +29,16 @@ _cube_root = kernel(cube_root)
 
 
 @kernel
-def _gain(top, bottom, current, lab, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best):  # type: ignore[no-untyped-def]
-    """Best gain and pressure index of each crayon on rows top..bottom: gain, best (k, h, w)."""
+def _gain(top, bottom, current, lab, need, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best):  # type: ignore[no-untyped-def]
+    """Best gain and pressure index of the needed crayons on rows top..bottom: gain, best (k, h, w)."""
     crayons, pressures = grain.shape
     for y in range(top, bottom):
         for x in range(current.shape[1]):
             r, g, b0 = current[y, x, 0], current[y, x, 1], current[y, x, 2]
             now = np.float32(0)
             for k in range(-1, crayons):
+                if k >= 0 and not (need[y, x] >> np.uint64(k)) & np.uint64(1):
+                    continue
                 top_gain, top_p = np.float32(-9), 0
                 for p in range(pressures if k >= 0 else 1):
                     if k >= 0:
@@ -60,19 +64,20 @@ def _gain(top, bottom, current, lab, a, b, grain, to_lms, to_lab, tone, dark_pri
 
 
 def gains(
-    current: Floats, lab: Floats, swatches: Swatches, tone: float, dark_price: float, threads: int
+    current: Floats, lab: Floats, swatches: Swatches, need: NDArray[np.uint64], coat: Pass, threads: int
 ) -> tuple[Floats, NDArray[np.int8]]:
-    """Gain (k, h, w) of each crayon at its best pressure, and that pressure's index (k, h, w).
+    """Gain (k, h, w) of each needed crayon at its best pressure, and that pressure's index (k, h, w).
 
-    current: linear colours on the sheet now (h, w, 3); lab: the target in OKLab (h, w, 3); tone: weight of lightness.
+    current: linear colours on the sheet now (h, w, 3); lab: the target in OKLab (h, w, 3); need (h, w): a bit
+    for each crayon in question. A crayon that is not has the gain UNASKED.
     """
     h, w = current.shape[:2]
-    gain = np.empty((len(swatches.names), h, w), np.float32)
-    best = np.empty(gain.shape, np.int8)
+    gain = np.full((len(swatches.names), h, w), UNASKED, np.float32)
+    best = np.zeros(gain.shape, np.int8)
 
     def band(top: int) -> None:
-        _gain(top, min(h, top + BAND), current, lab, swatches.a, swatches.b, swatches.grain, TO_LMS, TO_LAB,
-              np.float32(tone), np.float32(dark_price), np.float32(GRAIN_PRICE), gain, best)  # fmt: skip
+        _gain(top, min(h, top + BAND), current, lab, need, swatches.a, swatches.b, swatches.grain, TO_LMS, TO_LAB,
+              np.float32(coat.tone), np.float32(coat.dark_price), np.float32(GRAIN_PRICE), gain, best)  # fmt: skip
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(band, range(0, h, BAND)))
@@ -80,12 +85,12 @@ def gains(
 
 
 @kernel
-def _base(lab, group, base, shade, paper, a, b, grain, log_p, to_lms, to_lab, grain_price, sharp, out):  # type: ignore[no-untyped-def]
+def _base(top, bottom, lab, group, base, shade, paper, a, b, grain, log_p, to_lms, to_lab, grain_price, sharp, out):  # type: ignore[no-untyped-def]
     """Softly chosen pressure of the base coat for each cell, looking ahead to the shade over it."""
     pressures = log_p.size
     light = np.empty(3, np.float32)
     cost = np.empty(pressures * (pressures + 1), np.float32)
-    for y in range(lab.shape[0]):
+    for y in range(top, bottom):
         for x in range(lab.shape[1]):
             k1, k2 = base[group[y, x]], shade[group[y, x]]
             number = 0
@@ -119,55 +124,83 @@ def _base(lab, group, base, shade, paper, a, b, grain, log_p, to_lms, to_lab, gr
             out[y, x] = np.exp(mean / total)
 
 
-def base_pressure(lab: Floats, group: NDArray[np.int64], recipes: Recipes, swatches: Swatches) -> Floats:
+def base_pressure(lab: Floats, group: NDArray[np.int64], recipes: Recipes, swatches: Swatches, threads: int) -> Floats:
     """Pressure (h, w) of the base coat that, with the shade to come, brings each place nearest to its target.
 
     Choices of nearly equal worth are averaged, so pressure follows tone without steps.
     """
     out = np.empty(lab.shape[:2], np.float32)
-    _base(lab, group, recipes.base, recipes.shade, swatches.paper, swatches.a, swatches.b, swatches.grain,
-          np.log(swatches.pressures), TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(1 / 0.008), out)  # fmt: skip
+    log_p = np.log(swatches.pressures)
+
+    def band(top: int) -> None:
+        _base(top, min(len(out), top + BAND), lab, group, recipes.base, recipes.shade, swatches.paper, swatches.a,
+              swatches.b, swatches.grain, log_p, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(1 / 0.008), out)  # fmt: skip
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(band, range(0, len(out), BAND)))
     return out
 
 
-def plates(gain: Floats, best: NDArray[np.int8], swatches: Swatches, scene: Scene, coat: Pass, cells: float,
-           recipes: Recipes, streaks: Floats) -> Floats:  # fmt: skip
-    """The pressure (k, h, w) wanted of each crayon, 0 where it is not: one crayon at most in each place.
+def plates(
+    current: Floats, aim: Floats, group: NDArray[np.int64], swatches: Swatches, scene: Scene, recipes: Recipes,
+    coat: Pass, cells: float, streaks: Floats, threads: int,
+) -> dict[int, Floats]:  # fmt: skip
+    """The pressure (h, w) wanted of each crayon that is wanted at all: one crayon at most in each place.
 
-    The recipe says which crayon a base or shade coat takes; a free coat takes the one of most worth, with
-    neighbours agreeing over `coat.cohere` tips. A line goes on while the tip as a whole gains.
+    The recipe says which crayon a base or shade coat takes; a free coat takes the one of most worth. A line
+    goes on while the tip as a whole gains.
     """
-    crayons = len(gain)
-    group = grouped(scene.lab, recipes, coat.cohere * cells)
     if coat.kind == "base":
-        rival = streaks > 0.55
-        chosen = np.where(rival, recipes.rival[group], recipes.base[group])
-        level = blur(np.log(base_pressure(scene.lab, group, recipes, swatches)), 0.3 * cells)
+        chosen = np.where(streaks > RIVAL_SHARE, recipes.rival[group], recipes.base[group])
     elif coat.kind == "shade":
         chosen = recipes.shade[group]
     else:
-        worth = np.stack([blur(g, coat.cohere * cells) for g in gain])
-        used = np.isin(np.arange(crayons), recipes.crayons())
-        worth[~used] = -9
-        home = [(recipes.base[group] == k) | (recipes.shade[group] == k) for k in range(crayons)]
-        chosen = (worth - np.where(home, 0, STRANGER_PRICE)).argmax(0)
-    wants = np.zeros_like(gain)
-    allowed = scene.detail >= coat.detail
+        chosen = _worthiest(current, aim, group, swatches, recipes, coat, cells, threads)
+    reach = 2 * int(np.ceil(2 * coat.edge * cells)) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+    need = np.zeros(chosen.shape, np.uint64)
     for k in np.unique(chosen):
-        here = (chosen == k) & allowed & (blur(gain[k], coat.edge * cells) > coat.gain)
+        need |= cv2.dilate((chosen == k).astype(np.uint8), disc).astype(np.uint64) << np.uint64(k)
+    gain, best = gains(current, aim, swatches, need, coat, threads)
+    steps = np.log(swatches.pressures)
+    level = np.log(base_pressure(aim, group, recipes, swatches, threads)) if coat.kind == "base" else None
+    wants = {}
+    for k in np.unique(chosen):
+        here = (chosen == k) & (scene.detail >= coat.detail) & (blur(gain[k], coat.edge * cells) > coat.gain)
         if here.any():
-            if coat.kind != "base":
-                level = blur(np.log(swatches.pressures)[best[k]], 0.3 * cells)
-            wants[k] = np.where(here, np.exp(level), 0)
+            pressure = np.exp(blur(steps[best[k]] if level is None else level, 0.3 * cells))
+            wants[int(k)] = np.where(here, pressure, 0).astype(np.float32)
     return wants
+
+
+def _worthiest(
+    current: Floats, aim: Floats, group: NDArray[np.int64], swatches: Swatches, recipes: Recipes, coat: Pass,
+    cells: float, threads: int,
+) -> NDArray[np.int64]:  # fmt: skip
+    """The crayon (h, w) that gains most, where neighbours agree over `coat.cohere` tips; on a grid half as fine."""
+    h, w = aim.shape[:2]
+    half = (w // 2, h // 2)
+    group = cv2.resize(group.astype(np.int16), half, interpolation=cv2.INTER_NEAREST)
+    used = recipes.crayons()
+    need = np.full((half[1], half[0]), sum(1 << k for k in used), np.uint64)
+    small = cv2.resize(current, half, interpolation=cv2.INTER_AREA), cv2.resize(aim, half, interpolation=cv2.INTER_AREA)
+    gain, _ = gains(*small, swatches, need, coat, threads)
+    worth = np.full(gain.shape, -9, np.float32)
+    for k in used:
+        home = (recipes.base[group] == k) | (recipes.shade[group] == k)
+        worth[k] = blur(gain[k], 0.5 * coat.cohere * cells) - np.where(home, 0, STRANGER_PRICE)
+    return cv2.resize(worth.argmax(0).astype(np.int16), (w, h), interpolation=cv2.INTER_NEAREST).astype(np.int64)
 
 
 def grouped(lab: Floats, recipes: Recipes, sigma: float) -> NDArray[np.int64]:
     """The recipe (h, w) of each place: its nearest group of colours, after neighbours have agreed."""
-    weighted = lab * np.array([TONE, 1, 1], np.float32)
-    label = nearest(weighted, recipes.centres)
-    votes = np.stack([blur((label == g).astype(np.float32), sigma) for g in range(len(recipes.centres))])
-    return votes.argmax(0)
+    label = nearest(lab * np.array([TONE, 1, 1], np.float32), recipes.centres)
+    most, winner = np.full(label.shape, -1, np.float32), np.zeros(label.shape, np.int64)
+    for g in range(len(recipes.centres)):
+        votes = blur((label == g).astype(np.float32), sigma)
+        winner[votes > most] = g
+        most = np.maximum(most, votes)
+    return winner
 
 
 def streaks(h: int, w: int, cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:

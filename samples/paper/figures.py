@@ -2,8 +2,8 @@
 
     python samples/paper/figures.py OUT [--cell MM]
 
-Everything is drawn with the physics `rudolf2003` on cells of 0.1 mm; larger cells are faster. Figures 1, 5 and 8
-are close-ups, enlarged so that single cells can be seen.
+Everything is drawn with the physics `rudolf2003` on cells of 0.1 mm (larger ones are faster). Figures 1, 5
+and 8 are close-ups, enlarged four times.
 """
 
 import argparse
@@ -28,13 +28,14 @@ SIDE = 14.0  # of a swatch, mm
 DRAWINGS = Path(__file__).parents[1] / "drawings"
 
 Picture = NDArray[np.uint8]
+Point = tuple[float, float]
 
 
 def main() -> None:
     """Draw all figures into a folder and print their paths."""
     parser = argparse.ArgumentParser(description="Draw the figures of the 2003 paper.")
     parser.add_argument("out", type=Path, metavar="OUT", help="folder for the figures")
-    parser.add_argument("--cell", type=float, default=0.1, metavar="MM", help="side of a cell of the sheet (0.1)")
+    parser.add_argument("--cell", type=float, default=0.1, metavar="MM", help="side of a cell (default: 0.1)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     for name, figure in FIGURES.items():
@@ -60,8 +61,8 @@ def forces(cell: float) -> Easel:
 
 def deposition_and_smearing(cell: float) -> list[Easel]:
     """Fig. 8: one crayon across another, first without and then with smearing."""
-    strokes = [hatch((4, 4, 22, 16), 0.3, "purple", 3.0), line((6, 9), (34, 10.6), 4.0, "orange", 3.4)]
-    return [drawn("lunar", 38, 20, strokes, cell, smears) for smears in (False, True)]
+    strokes = [hatch((3, 3, 23, 16), 0.3, "purple", 3.0), line((4, 22), (22, 6), 4.0, "orange", 3.4)]
+    return [drawn("lunar", 26, 26, strokes, cell, smears) for smears in (False, True)]
 
 
 def crayons(cell: float) -> list[Easel]:
@@ -75,7 +76,9 @@ def crayons(cell: float) -> list[Easel]:
     return [drawn(paper, SIDE * len(names), SIDE * 2, strokes, cell) for paper in ("lunar", BLACK_PAPER)]
 
 
-def drawn(paper: str, width: float, height: float, strokes: list[Stroke], cell: float, smears: bool = True) -> Easel:
+def drawn(
+    paper: str, width: float, height: float, strokes: list[Stroke], cell: float, smears: bool = True
+) -> Easel:
     """Strokes on a sheet of `width` by `height` mm."""
     blank = Drawing(width, height, paper, PALETTE, (), PHYSICS, seed=3)
     stand = easel(blank, round(max(width, height) / cell), smears=smears)
@@ -83,9 +86,10 @@ def drawn(paper: str, width: float, height: float, strokes: list[Stroke], cell: 
     return stand
 
 
-def line(start: tuple[float, float], end: tuple[float, float], force: float, crayon: str, tip: float = 2.4) -> Stroke:
+def line(start: Point, end: Point, force: float, crayon: str, tip: float = 2.4) -> Stroke:
     """A straight stroke."""
-    return Stroke(np.array([start, end], np.float32), np.full(2, force, np.float32), crayon, Tip("blunt", tip), "line")
+    path = np.array([start, end], np.float32)
+    return Stroke(path, np.full(2, force, np.float32), crayon, Tip("blunt", tip), "line")
 
 
 def hatch(box: tuple[float, float, float, float], pressure: float, crayon: str, tip: float) -> Stroke:
@@ -114,8 +118,8 @@ def fig05(cell: float) -> Picture:
 
 
 def fig08(cell: float) -> Picture:
-    """Deposition alone (top) and with smearing (bottom)."""
-    return below(*(close_up(stand) for stand in deposition_and_smearing(cell)))
+    """Deposition alone (left) and with smearing (right)."""
+    return beside(*(close_up(stand) for stand in deposition_and_smearing(cell)))
 
 
 def fig10(cell: float) -> Picture:
@@ -144,7 +148,8 @@ def strokes_of(drawing: Drawing, rows: int, cols: int) -> Picture:
     ground = np.array(colour_linear(load_paper(drawing.paper).colour), np.float32)
     picture = np.ascontiguousarray(encode_srgb(np.tile(ground, (rows, cols, 1))))
     for stroke in drawing.strokes:
-        colour = encode_srgb(np.array(colour_linear(palette.crayons[palette.index(stroke.crayon)].hex), np.float32))
+        crayon = palette.crayons[palette.index(stroke.crayon)]
+        colour = encode_srgb(np.array(colour_linear(crayon.hex), np.float32))
         points = np.round(stroke.path_mm * (8 * rows / drawing.height_mm)).astype(np.int32)
         cv2.polylines(picture, [points], False, colour.tolist(), max(1, rows // 700), cv2.LINE_AA, shift=3)
     return picture
@@ -175,7 +180,8 @@ def label(picture: Picture, text: str, x: float, y: float, height: float = 0.03)
     """Write on a picture at fractions of its width and height."""
     size = height * picture.shape[0] / 22
     at = round(x * picture.shape[1]), round(y * picture.shape[0])
-    cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, (60, 60, 60), max(1, round(size)), cv2.LINE_AA)
+    thick = max(1, round(size))
+    cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, (60, 60, 60), thick, cv2.LINE_AA)
 
 
 if __name__ == "__main__":

@@ -8,9 +8,9 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from . import __version__, cache, memory
 from .did_you_mean import did_you_mean, quoted
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
     from PIL.Image import Image
+
     from stroke_gen.drawing import Drawing
 
     from .pipeline import Easel
@@ -34,8 +35,6 @@ MAX_THREADS = 256
 PHOTO_SIDE = 2048  # pixels of the photo's long side that are read: three times what the planner looks at
 STROKE_SUFFIXES = (".json",)
 _MM_PER_INCH = 25.4
-
-T = TypeVar("T")
 
 
 def convert(
@@ -64,8 +63,7 @@ def convert(
 
     settings = settings_of(choices)
     check_outputs([image, *used_files(settings)], out, strokes)
-    drawing, easel = sketch(image, settings, progress)
-    picture = finish(drawing, easel, out, strokes, light=light, told=notes(settings, light))
+    picture = finish(*sketch(image, settings, progress), out, strokes, light=light, settings=settings)
     if isinstance(image, np.ndarray):
         return picture
     if out is not None and not isinstance(image, Image.Image):
@@ -83,12 +81,11 @@ def draw(
     light: bool = True,
     progress: Progress | None = None,
 ) -> NDArray[np.uint8]:
-    """The picture of a Drawing, or of a drawing's file: uint8 sRGB (h, w, 3), `size` pixels along the long side.
+    """The picture of a Drawing, or of a drawing's file: uint8 sRGB (h, w, 3), its long side `size` pixels.
 
     preview: without smearing and at half the size. The rest, and the errors, as in `convert`.
     """
-    drawing, easel = redraw(drawing, size, threads, preview, progress, out=out)
-    return finish(drawing, easel, out, light=light, told={"crayonize": __version__, "seed": drawing.seed})
+    return finish(*redraw(drawing, size, threads, preview, progress, out=out), out, light=light)
 
 
 # ---- what the command line shares ------------------------------------------------------------------------
@@ -106,7 +103,7 @@ def settings_of(choices: dict[str, Any]) -> Settings:
     _check_threads(settings.threads)
     for box in settings.focus:
         if len(box) != 4 or not all(0 <= x <= 1 for x in box):
-            raise ValueError(f"focus: {box!r} is not x, y, w, h in fractions of the picture, each from 0 to 1")
+            raise ValueError(f"focus: {box!r} is not x, y, w, h as fractions of the picture, from 0 to 1")
     return settings
 
 
@@ -145,7 +142,7 @@ def check_outputs(
             continue
         for path in taken:
             if same_file(path, output):
-                raise ValueError(f"{os.fspath(output)}: would be written over {os.fspath(path)}; give another name")
+                raise ValueError(f"{output}: would be written over {path}; give another name")
         folder = Path(output).parent
         if not folder.is_dir():
             raise ValueError(f"{os.fspath(output)}: the folder {folder} does not exist; create it first")
@@ -200,11 +197,11 @@ def finish(
     strokes: str | os.PathLike[str] | None = None,
     *,
     light: bool,
-    told: dict[str, str | int | float],
+    settings: Settings | None = None,
 ) -> NDArray[np.uint8]:
     """The picture as uint8 sRGB; written to `out` and its strokes to `strokes` if these are given.
 
-    told: what is written into the picture about itself.
+    settings: of the photo, to be noted in the picture beside what the drawing itself says.
     """
     from stroke_gen.drawing import save_drawing
 
@@ -214,14 +211,15 @@ def finish(
     picture = encode_srgb(easel.picture(light))
     if out is not None:
         dpi = easel.sheet.cols / drawing.width_mm * _MM_PER_INCH
+        told = notes(drawing, settings) | {"light": light, "smears": easel.smears}
         write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None)
     if strokes is not None:
         save_drawing(drawing, strokes)
     return picture
 
 
-def notes(settings: Settings, light: bool) -> dict[str, str | int | float]:
-    """What is written into the picture: enough to draw it again, and no folder names."""
+def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str | int | float]:
+    """What is written into a picture: enough to draw it again, and no folder names."""
 
     def short(value: Any) -> str | int | float:
         if isinstance(value, dict):
@@ -230,10 +228,11 @@ def notes(settings: Settings, light: bool) -> dict[str, str | int | float]:
             return Path(value).name
         return value if isinstance(value, int | float) else repr(value)
 
-    kept = replace(settings, threads=None)  # changes nothing in the picture
-    chosen = {f.name: getattr(kept, f.name) for f in fields(kept)}
+    chosen = {name: getattr(drawing, name) for name in ("paper", "palette", "physics", "seed")}
+    if settings:  # the number of threads changes nothing in the picture
+        chosen |= {f.name: getattr(settings, f.name) for f in fields(settings) if f.name != "threads"}
     named = {name: short(value) for name, value in chosen.items() if value not in (None, ())}
-    return {"crayonize": __version__, **named, "light": light}
+    return {"crayonize": __version__, **named}
 
 
 @functools.cache
@@ -249,6 +248,7 @@ def workshop() -> ModuleType:
 def warm_up() -> None:
     """Draw a tiny picture through every kernel, so that all are compiled and kept."""
     import numpy as np
+
     from stroke_gen.params import style_names
 
     y, x = np.mgrid[:48, :64] / np.float32(48)

@@ -20,7 +20,7 @@ from . import cache, optics, paper, rub
 from .palette import Palette
 from .wax import Sheet
 
-PRESSURES = (0.04, 0.1, 0.22, 0.45, 0.9, 1.7)  # N/mm^2
+PRESSURES = (0.04, 0.1, 0.2, 0.38, 0.62, 0.95)  # N/mm^2
 TIP = Tip("blunt", 2.4)
 SPACING = 0.62  # of the tip's width
 PATCH_MM, EDGE_MM = 11.0, 2.5  # a swatch, and what is left out of the mean around it

@@ -4,8 +4,8 @@ The first word chooses: draw, palettes, styles, papers or warmup; anything else 
 anything printed: what was asked for on stdout, all else on stderr. `--help` and the listings load neither
 numpy nor numba, so imports of anything heavy stand inside functions.
 
-Exit codes: 0 done; 1 stopped (an output cannot be written, an error of ours); 2 the command line or a file
-it names cannot be used; 3 an extra is not installed; 130 Ctrl-C; 143 terminated.
+Exit codes: 0 done; 1 stopped (an output cannot be written, an error of ours); 2 the command line, or a file
+it names, cannot be used; 3 an extra package is missing; 130 Ctrl-C; 143 terminated.
 """
 
 import argparse
@@ -13,88 +13,77 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import fields
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from . import __version__
 from .did_you_mean import did_you_mean, printable
 from .settings import Settings
 
-_NEARLY_ALL = "0 quiet, errors only; 1 as usual; 2 tells seed and time; 3 shows tracebacks"
+if TYPE_CHECKING:
+    from .api import Progress
+    from .pipeline import Easel
 
-
-class _Parser(argparse.ArgumentParser):
-    """argparse with our way of complaining: a ValueError of one line that knows the nearest option."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **options)
-
-    def error(self, message: str) -> NoReturn:
-        raise ValueError(f"{message}; see {self.prog} --help")
-
-    def read(self, words: Sequence[str]) -> argparse.Namespace:
-        """Parsed arguments; an unknown option is named with the nearest one."""
-        options, rest = self.parse_known_args(words)
-        for word in rest:
-            if word.startswith("-"):
-                name = word.partition("=")[0]
-                known = [o for action in self._actions for o in action.option_strings if o.startswith("--")]
-                raise ValueError(f"unknown option {printable(name)}{did_you_mean(name, known)}")
-        if rest:
-            raise ValueError(f"too many arguments: {printable(rest[0])}; see {self.prog} --help")
-        return options
+_COMMANDS_HELP = """\
+other commands:
+  crayonize draw DRAWING.json OUT   draw saved or hand-made strokes
+  crayonize palettes|styles|papers  list what there is
+  crayonize warmup                  compile everything for this machine now
+"""
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     words = list(sys.argv[1:] if words is None else words)
-    loud = sum(word.count("v") for word in words if word in ("-v", "-vv", "--verbose"))
+    with suppress(ValueError):  # not in the main thread
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-        run = COMMANDS.get(words[0]) if words else None
-        code = run(words[1:]) if run else _convert(words)
+        command = COMMANDS.get(words[0]) if words else None
+        code = command(words[1:]) if command else _convert(words)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:  # the reader of our listing has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except KeyboardInterrupt:
         return 130
+    except BrokenPipeError:  # the reader of a listing has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except Exception as error:
-        if loud > 1:
+        if words.count("-v") + 2 * words.count("-vv") > 1:
             raise
-        return _complain(error)
+        code, line = _verdict(error)
+        print(f"crayonize: {_one_line(line)}", file=sys.stderr)
+        return code
 
 
-def _complain(error: Exception) -> int:
-    """One line about an error on stderr; returns the exit code."""
-    if isinstance(error, ValueError | TypeError) and _missing_extra(error):
-        code, line = 3, str(error)
-    elif isinstance(error, ValueError):
-        code, line = 2, str(error)
-    elif isinstance(error, MemoryError):
-        code, line = 1, "there is not enough memory; choose a smaller --size"
-    elif isinstance(error, OSError):
-        name = f"{os.fsdecode(error.filename)}: " if error.filename is not None else ""
-        code, line = 1, f"{name}{error.strerror or error}"
-    else:
-        code, line = 1, f"an error of ours, {type(error).__name__}: {error}; -vv shows where"
-    print(f"crayonize: {printable(' '.join(line.split()))}", file=sys.stderr)
-    return code
+def _verdict(error: Exception) -> tuple[int, str]:
+    """Exit code and message for an error."""
+    if _lacks_package(error):
+        return 3, str(error)
+    if isinstance(error, ValueError):
+        return 2, str(error)
+    if isinstance(error, MemoryError):
+        return 1, "there is not enough memory; choose a smaller --size"
+    if isinstance(error, OSError):
+        name = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
+        return 1, f"{name}{error.strerror or error}"
+    return 1, f"this should not have happened ({type(error).__name__}: {error}); -v -v shows where"
 
 
-def _missing_extra(error: BaseException) -> bool:
+def _lacks_package(error: BaseException | None) -> bool:
     """Whether an error goes back to a package that is not installed."""
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, ImportError):
-            return True
-        cause = cause.__cause__
-    return False
+    while error is not None and not isinstance(error, ImportError):
+        error = error.__cause__
+    return error is not None
+
+
+def _one_line(text: str) -> str:
+    return printable(" ".join(text.split()))
 
 
 # ---- the commands ----------------------------------------------------------------------------------------
@@ -102,39 +91,227 @@ def _missing_extra(error: BaseException) -> bool:
 
 def _convert(words: Sequence[str]) -> int:
     """crayonize PHOTO [OUT]: draw a photo."""
+    options = _convert_parser().read(words)
+    begun = time.monotonic()
+    photo = Path(options.photo)
+    out = options.out or photo.with_name(f"{photo.stem}.crayon.png")
+
     from stroke_gen import params
 
     from . import api
     from .palette import load_palette
 
-    options = _convert_parser().read(words)
-    begun = time.monotonic()
-    out = options.out or Path(options.photo).with_suffix("").with_name(f"{Path(options.photo).stem}.crayon.png")
-    settings = api.settings_of(_settings(options))
+    chosen = {f.name: getattr(options, f.name) for f in fields(Settings) if f.name in options}
+    settings = api.settings_of(chosen)
     load_palette(settings.palette)
     params.with_force(params.load_style(settings.style), settings.force)
-    if not Path(options.photo).exists():
-        raise ValueError(f"{options.photo}: there is no such file")
-    api.check_outputs([options.photo, *api.used_files(settings)], out, options.strokes)
+    api.check_outputs([photo, *api.used_files(settings)], out, options.strokes)
     with _talk(options) as progress:
         drawing, easel = api.sketch(options.photo, settings, progress)
-        api.finish(drawing, easel, out, options.strokes, light=options.light, told=api.notes(settings, options.light))
-    _report(options, out, easel, len(drawing.strokes), settings.seed, begun)
-    if options.out is None and options.loud == 0:
-        print(f"crayonize: drawn as {printable(str(out))}", file=sys.stderr)
+        api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings)
+    if options.verbose or (options.out is None and not options.quiet):
+        _report(out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
 
 
 def _draw(words: Sequence[str]) -> int:
     """crayonize draw DRAWING OUT: render strokes."""
-    from . import api
-
     options = _draw_parser().read(words)
     begun = time.monotonic()
+
+    from . import api
+
     with _talk(options) as progress:
         drawing, easel = api.redraw(
             options.drawing, options.size, options.threads, options.preview, progress, out=options.out
         )
-        api.finish(drawing, easel, options.out, light=options.light, told=api.notes_of(drawing, options))
-    _report(options, options.out, easel, len(drawing.strokes), drawing.seed, begun)
+        api.finish(drawing, easel, options.out, light=options.light)
+    if options.verbose:
+        _report(options.out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
+
+
+def _warmup(words: Sequence[str]) -> int:
+    """crayonize warmup: fill the compile cache."""
+    parser = _Parser(prog="crayonize warmup", description="Compile everything for this machine, and keep it.")
+    _add_talk(parser)
+    options = parser.read(words)
+    begun = time.monotonic()
+
+    from . import api
+
+    with _talk(options):
+        api.warm_up()
+    if not options.quiet:
+        print(f"crayonize: ready after {time.monotonic() - begun:.1f} s", file=sys.stderr)
+    return 0
+
+
+def _palettes(words: Sequence[str]) -> int:
+    """crayonize palettes: list the boxes of crayons."""
+    _Parser(prog="crayonize palettes", description="List the boxes of crayons, for --palette.").read(words)
+    from .palette import palette_names
+
+    return _list((name, f"{number:3} crayons  {title}") for name, title, number in palette_names())
+
+
+def _styles(words: Sequence[str]) -> int:
+    """crayonize styles: list the ways to draw."""
+    _Parser(prog="crayonize styles", description="List the ways to draw, for --style.").read(words)
+    from stroke_gen.params import style_names
+
+    return _list(iter(style_names().items()))
+
+
+def _papers(words: Sequence[str]) -> int:
+    """crayonize papers: list the papers."""
+    _Parser(prog="crayonize papers", description="List the papers, for --paper.").read(words)
+    import tomllib
+
+    text = (Path(__file__).with_name("data") / "papers.toml").read_text("utf-8")
+    return _list((name, str(row["title"])) for name, row in tomllib.loads(text).items())
+
+
+def _list(rows: Iterator[tuple[str, str]]) -> int:
+    for name, text in rows:
+        print(f"{name:12} {text}")
+    return 0
+
+
+COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
+    "draw": _draw,
+    "palettes": _palettes,
+    "styles": _styles,
+    "papers": _papers,
+    "warmup": _warmup,
+}
+
+
+# ---- what is said ----------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _talk(options: argparse.Namespace) -> Iterator["Progress"]:
+    """The progress line, and our own messages, on stderr; with -q nothing, and warnings only with -v."""
+    import logging
+    import warnings
+
+    from .progress import Bar
+
+    with Bar(shown=not options.quiet) as bar, warnings.catch_warnings():
+
+        class Messages(logging.Handler):
+            def emit(self, record: logging.LogRecord) -> None:
+                bar.clear()
+                print(f"crayonize: {record.getMessage()}", file=sys.stderr, flush=True)
+
+        log, messages = logging.getLogger("crayonize"), Messages()
+        if not options.verbose:
+            warnings.simplefilter("ignore")
+        if not options.quiet:
+            log.addHandler(messages)
+            log.setLevel(logging.INFO)
+        try:
+            yield bar
+        finally:
+            log.removeHandler(messages)
+
+
+def _report(out: str | Path, easel: "Easel", strokes: int, seed: int, begun: float) -> None:
+    """What was done, for -v and where the name of the output was ours to choose."""
+    size = f"{easel.sheet.cols} x {easel.sheet.rows} pixels"
+    figures = f"{size}, {strokes} strokes, seed {seed}, {time.monotonic() - begun:.1f} s"
+    print(f"crayonize: {printable(os.fspath(out))}: {figures}", file=sys.stderr)
+
+
+# ---- the options -----------------------------------------------------------------------------------------
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse, complaining in our way: by a ValueError of one line that names the nearest option."""
+
+    def __init__(self, prog: str, description: str, epilog: str = "") -> None:
+        super().__init__(
+            prog=prog,
+            description=description,
+            epilog=epilog,
+            allow_abbrev=False,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+
+    def error(self, message: str) -> NoReturn:
+        raise ValueError(f"{message}; see {self.prog} --help")
+
+    def read(self, words: Sequence[str]) -> argparse.Namespace:
+        """The options, in any order with the names of files."""
+        known = [option for option in self._option_string_actions if option.startswith("--")]
+        for word in words[: words.index("--")] if "--" in words else words:
+            name = word.partition("=")[0]
+            if name.startswith("--") and name not in known:
+                raise ValueError(f"unknown option {printable(name)}{did_you_mean(name, known)}")
+        options, rest = self.parse_known_intermixed_args(words)
+        if rest:
+            raise ValueError(f"{printable(rest[0])} is one too many; see {self.prog} --help")
+        return options
+
+
+def _convert_parser() -> _Parser:
+    parser = _Parser("crayonize", "Draw a photo with wax crayons, stroke by stroke.", _COMMANDS_HELP)
+    parser.add_argument("photo", metavar="PHOTO", help="JPEG, PNG, WebP, TIFF or AVIF")
+    add = parser.add_argument
+    add("out", metavar="OUT", nargs="?", help="PNG, JPEG, WebP or TIFF; else PHOTO.crayon.png")
+    add("--palette", default=Settings.palette, help="of `crayonize palettes`, a file, or #rrggbb,... (%(default)s)")
+    add("--style", default=Settings.style, help="of `crayonize styles`, or a .toml file (%(default)s)")
+    add("--paper", default=Settings.paper, help="of `crayonize papers`, or a picture of one (%(default)s)")
+    add("--force", default=Settings.force, help="light, normal, heavy or a factor, 0.1 to 5 (%(default)s)")
+    add("--seed", type=_seed, default=Settings.seed, help="a whole number, or `random` (%(default)s)")
+    add("--focus", type=_focus, action="append", default=[], metavar="X,Y,W,H",
+        help="a part that deserves care, in fractions of the picture; may be repeated")  # fmt: skip
+    add("--strokes", metavar="FILE", help="save the strokes as .json, for `crayonize draw`")
+    _add_size(parser)
+    _add_talk(parser)
+    add("--version", action="version", version=f"crayonize {__version__}")
+    return parser
+
+
+def _draw_parser() -> _Parser:
+    parser = _Parser("crayonize draw", "Draw saved or hand-made strokes.")
+    parser.add_argument("drawing", metavar="DRAWING", help="a .json file of strokes")
+    parser.add_argument("out", metavar="OUT", help="PNG, JPEG, WebP or TIFF")
+    _add_size(parser)
+    _add_talk(parser)
+    return parser
+
+
+def _add_size(parser: _Parser) -> None:
+    add = parser.add_argument
+    add("--size", type=_whole, default=Settings.size, help="long side in pixels, 1 to 20000 (%(default)s)")
+    add("--threads", type=_whole, help="at most so many at once; the picture stays the same (all cores)")
+    add("--preview", action="store_true", help="quick: half the size, and no smearing")
+    add("--no-light", dest="light", action="store_false", help="no shading of the relief")
+
+
+def _add_talk(parser: _Parser) -> None:
+    loudness = parser.add_mutually_exclusive_group()
+    loudness.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors")
+    loudness.add_argument("-v", "--verbose", action="count", default=0, help="tell seed and time")
+
+
+def _whole(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+
+
+def _seed(text: str) -> int:
+    if text == "random":
+        return int.from_bytes(os.urandom(4))
+    return _whole(text)
+
+
+def _focus(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not x,y,w,h in fractions of the picture") from None

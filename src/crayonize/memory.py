@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-BYTES_PER_CELL = 96  # the sheet 57, the making of its tooth or its light 28, the picture to be written the rest
+BYTES_PER_CELL = 96  # the sheet 57; making its tooth or its light 28; the picture to be written
 OVERHEAD = 450_000_000  # the libraries, the photo, the planner's work, the strokes
 
 
 def check_fits(rows: int, cols: int, available: int | None = None) -> None:
-    """ValueError naming the figures if a sheet of rows x cols cells does not fit into the memory available."""
+    """ValueError naming the figures if a sheet of rows x cols cells does not fit into memory."""
     needed = rows * cols * BYTES_PER_CELL + OVERHEAD
     free = available_bytes() if available is None else available
     if free is None or needed <= free:
@@ -18,9 +18,8 @@ def check_fits(rows: int, cols: int, available: int | None = None) -> None:
     shrink = math.sqrt(max(0, free - OVERHEAD) / (needed - OVERHEAD))
     fitting = int(max(rows, cols) * shrink)
     advice = f"; a size of {fitting} would fit" if fitting >= 16 else ""
-    raise ValueError(
-        f"size: {cols} x {rows} cells need {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free{advice}"
-    )
+    figures = f"{needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free"
+    raise ValueError(f"size: {cols} x {rows} cells need {figures}{advice}")
 
 
 def available_bytes() -> int | None:
@@ -43,7 +42,8 @@ def _of_groups() -> Iterator[int]:
             if not controllers:
                 base, most, now = Path("/sys/fs/cgroup"), "memory.max", "memory.current"
             elif "memory" in controllers.split(","):
-                base, most, now = Path("/sys/fs/cgroup/memory"), "memory.limit_in_bytes", "memory.usage_in_bytes"
+                base = Path("/sys/fs/cgroup/memory")
+                most, now = "memory.limit_in_bytes", "memory.usage_in_bytes"
             else:
                 continue
             inner = base / group.lstrip("/")

@@ -111,7 +111,8 @@ def rub(
     done = 0
     with ThreadPoolExecutor(threads) as pool:
         for members in _by_level(level):
-            list(pool.map(draw, schedule.shares(members, cost, threads)))
+            parts = schedule.shares(members, cost, threads)
+            list((pool.map if len(parts) > 1 else map)(draw, parts))  # handing one part over would cost more
             done += members.size
             if progress:
                 progress(done, len(strokes))

@@ -31,7 +31,7 @@ FIRST, LAST = 0.4, 1.5  # seconds for which the bare sheet and the finished draw
 FILL_MM_S, LINE_MM_S = 200.0, 60.0  # how fast a hand fills a plane, and draws a line
 LINES = ("line", "detail", "outline")  # notes of strokes that are drawn slowly
 LIFT_S, DAB_S = 0.25, 0.1  # time from stroke to stroke, and for a dab
-TILE = 16  # pixels of the film that are renewed together
+TILE = 8  # pixels of the film that are renewed together
 SHADES = 4096  # steps of light in the table of sRGB codes
 
 Floats = NDArray[np.float32]
@@ -159,18 +159,23 @@ class _View:
         frame = self.now.copy()
         if stroke is None or passed >= 1:
             return frame
-        ahead = self._swath(_along(stroke.path_mm[::-1], 1 - passed), stroke)
-        ahead[self._swath(_along(stroke.path_mm, passed), stroke) > 0] = 0
-        np.copyto(frame, self.before, where=ahead[..., None] > 0)
+        low = np.floor((stroke.path_mm.min(0) - stroke.tip.width_mm) * self.pixels_per_mm).astype(int).clip(0)
+        high = np.ceil((stroke.path_mm.max(0) + stroke.tip.width_mm) * self.pixels_per_mm).astype(int).clip(0) + 1
+        part = np.s_[low[1] : high[1], low[0] : high[0]]
+        ahead = self._swath(_along(stroke.path_mm[::-1], 1 - passed), stroke, low, frame[part].shape[:2])
+        ahead &= ~self._swath(_along(stroke.path_mm, passed), stroke, low, frame[part].shape[:2])
+        np.copyto(frame[part], self.before[part], where=ahead[..., None])
         return frame
 
-    def _swath(self, path: Floats, stroke: Stroke) -> Frame:
-        """Where the tip touches on its way along a path: (h, w), 0 or 1."""
-        mask = np.zeros(self.now.shape[:2], np.uint8)
-        points = np.round(path * self.pixels_per_mm * 16).astype(np.int32)
+    def _swath(
+        self, path: Floats, stroke: Stroke, corner: NDArray[np.int64], shape: tuple[int, ...]
+    ) -> NDArray[np.bool_]:
+        """Where the tip touches on its way along a path, in a part of the film of this corner and shape."""
+        mask = np.zeros(shape, np.uint8)
+        points = np.round((path * self.pixels_per_mm - corner) * 16).astype(np.int32)
         width = max(1, round((stroke.tip.width_mm + 3 * self.easel.sheet.cell_mm) * self.pixels_per_mm))
         cv2.polylines(mask, [points], False, 1, width, cv2.LINE_8, 4)
-        return mask
+        return mask > 0
 
     def _runs(self, strokes: Sequence[Stroke]) -> list[tuple[int, int, int]]:
         """Rows of tiles that strokes touched: (row, first tile, tile after the last)."""

@@ -51,6 +51,7 @@ class Recipe:
     """How every photo of a batch is drawn, and the limits under which it is opened."""
 
     settings: Settings
+    light: bool = True  # shade the relief of paper and wax
     metadata: str = "safe"
     page: str | None = None  # sheet of paper to fill, such as "a4"; None leaves the sheet of the settings
     dpi: float | None = None
@@ -64,7 +65,8 @@ class Recipe:
         """
         shaping = asdict(self.settings)
         del shaping["threads"]
-        shaping |= {"metadata": self.metadata, "page": self.page, "dpi": self.dpi, "suffix": suffix}
+        shaping |= {"light": self.light, "metadata": self.metadata, "page": self.page, "dpi": self.dpi,
+                    "suffix": suffix}  # fmt: skip
         by_name = (self.settings.palette, self.settings.paper, self.settings.style)
         files = [Path(name) for name in by_name if isinstance(name, str) and Path(name).is_file()]
         shaping["files"] = [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]

@@ -5,17 +5,109 @@ import os
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
-from ..image_color import encode_srgb
-from ..image_read import open_picture, read_linear
-from ..image_write import file_format, read_settings, same_file, write_image
-from ..settings import Settings
+from .. import api
+from ..image_read import open_picture
+from ..image_write import read_settings, same_file
+from . import memory
 from .job import Job, Outcome, Recipe
-from .worker import OutputError
 
 Ask = Callable[[int], bool]  # wait until so many bytes of memory are free; False if they never will be
-Render = Callable[[NDArray[np.float32], Settings], tuple[NDArray[np.float32], int]]
+
+
+class OutputError(Exception):
+    """No picture can be written: the disk is full, or the folder is closed to us."""
+
+
+class Studio:
+    """Everything that is set up once and used for every photo."""
+
+    def __init__(self, recipe: Recipe, render: str | None) -> None:
+        """render: "module:function" that stands in for `api.sketch`. ValueError for settings that are none."""
+        self._recipe = recipe
+        if render is None:
+            _check(recipe)
+            api.workshop()
+            self._sketch: Callable[..., Any] = api.sketch
+        else:
+            module, _, name = render.partition(":")
+            self._sketch = getattr(import_module(module), name)
+
+    def make(self, job: Job, ask: Ask) -> Outcome:
+        """Draw the photo of a job. OutputError if this and every other picture cannot be written."""
+        try:
+            return self._make(job, ask)
+        except ValueError as error:
+            return Outcome("failed", str(error))
+        except MemoryError:
+            return Outcome("failed", "there is not enough memory for it; choose a smaller --size or fewer --jobs")
+        except OutputError:
+            raise
+        except Exception as error:  # one photo is never worth the others
+            return Outcome("failed", f"this should not have happened ({type(error).__name__}: {error})")
+
+    def _make(self, job: Job, ask: Ask) -> Outcome:
+        recipe, source, target = self._recipe, job.photo.source, Path(job.target)
+        needed = self._look_at(source)
+        if not ask(needed):
+            raise ValueError(f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first")
+        if same_file(source, target):
+            raise ValueError("its picture would take its own place; choose another output folder")
+        if job.strange and not _is_ours(target):
+            raise ValueError(f"at {job.out!r} stands something that was not made here; --existing skip or overwrite")
+        drawing, easel = self._sketch(source, recipe.settings)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            api.finish(drawing, easel, target, light=recipe.light, settings=recipe.settings)
+            _keep_name(target.parent)
+        except OSError as error:
+            if error.errno == errno.ENAMETOOLONG:
+                raise ValueError("the name of its picture is too long for this disk") from error
+            raise OutputError(f"{error.filename or job.out}: {error.strerror or error}") from error
+        return Outcome("ok", bytes=target.stat().st_size, strokes=len(drawing.strokes))
+
+    def _look_at(self, source: str) -> int:
+        """Bytes of memory it will take, by the header alone; ValueError for a photo beyond the limits."""
+        recipe = self._recipe
+        size = Path(source).stat().st_size
+        if size > recipe.max_bytes:
+            raise ValueError(f"has {size} bytes; the limit is {recipe.max_bytes} (--max-bytes)")
+        with open_picture(source) as (picture, _):
+            pixels = picture.width * picture.height
+            if pixels > recipe.max_pixels:
+                raise ValueError(f"has {pixels} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
+            return memory.need(str(picture.format), pixels, recipe.settings.size)
+
+
+def _check(recipe: Recipe) -> None:
+    """ValueError for a palette, paper, style or force that there is not."""
+    from stroke_gen import params
+
+    from .. import paper, rub
+    from ..palette import load_palette
+
+    settings = recipe.settings
+    load_palette(settings.palette)
+    paper.load_paper(settings.paper)
+    params.with_force(params.load_style(settings.style), settings.force)
+    rub.physics(settings.physics)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a picture says that we made it."""
+    try:
+        return bool(read_settings(path))
+    except ValueError:
+        return False
+
+
+def _keep_name(folder: Path) -> None:
+    """Have the folder's new entry on disk before anybody notes that it is there."""
+    if os.name == "nt":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -22,10 +22,6 @@ _BUFFERS = 512 << 20  # address space that threads and allocators reserve withou
 Message = dict[str, Any]
 
 
-class OutputError(Exception):
-    """No picture can be written: the disk is full, or the folder is closed to us."""
-
-
 class _Line:
     """The two pipes to the crew."""
 
@@ -70,9 +66,9 @@ def main() -> None:
     hello = line.open()
     _die_with(hello["parent"])
     try:
-        from .picture import Studio
+        from .picture import OutputError, Studio
 
-        studio = Studio(Recipe.from_json(hello["recipe"]), hello["threads"], hello["render"])
+        studio = Studio(Recipe.from_json(hello["recipe"]), hello["render"])
         _limit_memory(hello["memory"])
     except ValueError as error:
         return line.say({"refused": str(error)})
