@@ -110,11 +110,11 @@ def detail(lab: Floats, tip: float, focus: Sequence[tuple[float, float, float, f
     return np.asarray(level, np.float32)
 
 
-def turned(tangent: Floats, degrees: float) -> Floats:
-    """A field of directions turned by an angle."""
-    c, s = np.float32(np.cos(np.deg2rad(degrees))), np.float32(np.sin(np.deg2rad(degrees)))
+def turned(tangent: Floats, degrees: "float | Floats") -> Floats:
+    """A field of directions turned by an angle, one for all or one for each place (h, w)."""
+    c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     x, y = tangent[..., 0], tangent[..., 1]
-    return np.ascontiguousarray(np.dstack([c * x - s * y, s * x + c * y]))
+    return np.ascontiguousarray(np.dstack([c * x - s * y, s * x + c * y]), np.float32)
 
 
 def tone_map(scene: Scene, swatches: Swatches, style: Style) -> Scene:

@@ -32,15 +32,21 @@ class Line:
     worth: float
 
 
-def outlines(scene: Scene, now: Floats, box: Swatches, style: Style, rng: np.random.Generator) -> list[Stroke]:
-    """Outline strokes for a scene whose sheet shows `now` (h, w, 3), light crayons first."""
+def outlines(
+    scene: Scene, group: NDArray[np.int64], now: Floats, box: Swatches, style: Style, rng: np.random.Generator
+) -> list[Stroke]:
+    """Outline strokes for a scene whose sheet shows `now` (h, w, 3), light crayons first.
+
+    group (h, w): the recipe of each place, whose areas closed outlines go round.
+    """
     if style.lines <= 0:
         return []
     tip = Tip("sharp", style.line_tip * style.tip_mm)
     width = tip.width_mm / scene.cell_mm
     budget = style.lines * BUDGET * max(scene.detail.shape)
     picked = []
-    for line in sorted(_lines(scene, width), key=lambda line: -line.worth):
+    candidates = _areas(scene, group, width) if style.closed else _lines(scene, width)
+    for line in sorted(candidates, key=lambda line: -line.worth):
         budget -= len(line.path)
         if budget < 0:
             break
@@ -76,6 +82,31 @@ def _lines(scene: Scene, width: float) -> list[Line]:
             if line is not None:
                 lines.append(line)
     return lines
+
+
+def _areas(scene: Scene, group: NDArray[np.int64], width: float) -> list[Line]:
+    """Closed lines round the larger areas of one colour."""
+    lightness = blur(scene.lab[..., 0], max(0.3 * width, 0.7))
+    lines = []
+    for g in np.unique(group):
+        area = blur((group == g).astype(np.float32), 1.2 * width) > 0.5
+        rings, _ = cv2.findContours(area.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+        for ring in rings:
+            path = ring[:, 0].astype(np.float32) + 0.5
+            if cv2.contourArea(path) < 20 * width * width:
+                continue
+            around = np.concatenate([path, path[: max(3, int(2 * width))]])  # the end runs a little past the beginning
+            line = _line(_fair(np.repeat(around, SCALE, 0), 1.5 * width * SCALE), scene, lightness, width)
+            if line is not None and not _on_border(line.path, group.shape):
+                lines.append(line)
+    return lines
+
+
+def _on_border(path: Floats, shape: tuple[int, ...]) -> bool:
+    """Whether most of a line runs along the picture's border."""
+    x, y = path.T
+    off = (x < 3) | (y < 3) | (x > shape[1] - 3) | (y > shape[0] - 3)
+    return bool(off.mean() > 0.5)
 
 
 def _fair(path: Floats, sigma: float) -> Floats:

@@ -1,6 +1,7 @@
 """The conductor: photo to strokes. It lists the stages and holds no mathematics of its own."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,14 +32,20 @@ def generate(
     scene = analysis.tone_map(scene, swatches, style)
     plan = recipes.find(scene.lab, swatches, style.recipes, style.crayons, rng)
     group = separation.grouped(scene.lab, plan, 0.45 * style.tip_mm / scene.cell_mm)
-    strokes: list[Stroke] = []
+    fan = style.fan_deg * rng.standard_normal(len(plan.base))[group] if style.fan_deg else 0.0
+    scene = replace(scene, tangent=analysis.turned(scene.tangent, fan))
+    box = swatches.only(plan.crayons())
     shape = scene.detail.shape
+    strokes: list[Stroke] = []
     now = observe([], shape)
+    if style.lines_first:
+        strokes = contours.outlines(scene, group, now, box, style, rng)
+        now = observe(strokes, shape)
     for coat in style.passes:
         fresh = _coat(scene, group, now, swatches, plan, coat, style, rng, threads)
         strokes += fresh
         now = observe(fresh, shape)
-    fresh = contours.outlines(scene, now, swatches.only(plan.crayons()), style, rng)
+    fresh = contours.outlines(scene, group, now, box, style, rng)
     observe(fresh, shape)
     return strokes + fresh
 
@@ -52,7 +59,7 @@ def _coat(
     cells = width / scene.cell_mm
     aim = oklab(analysis.blur(scene.target, coat.soften * 0.5 * cells))
     streaks = separation.streaks(*group.shape, cells, style.wrist_deg, rng)
-    wants = separation.plates(analysis.blur(now, 0.5 * cells), aim, group, box, scene, plan, coat, cells, streaks, threads)
+    wants = separation.plates(analysis.blur(now, 0.5 * cells), aim, group, box, scene, plan, coat, cells, style.flat, streaks, threads)
     tangent = analysis.turned(scene.tangent, coat.angle)
     how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single)
     strokes: list[Stroke] = []

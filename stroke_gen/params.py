@@ -56,7 +56,11 @@ class Style:
     swell: float = 0.12  # 0..1 along a line
     wobble: float = 0.05  # 0..1 tips sideways
     overshoot: float = 0.15  # 0..3 tips beyond the ends
+    flat: float = 0.0  # 0..1 one pressure for all of a colour instead of following its tone
+    fan_deg: float = 0.0  # 0..90 spread of directions from one colour's areas to another's
     lines: float = 1.0  # 0..5 amount of outline
+    closed: bool = False  # outlines go round whole areas instead of along edges
+    lines_first: bool = False  # outlines before the fill, as children draw; drawn once more at the end
     line_tip: float = 0.45  # 0.2..3 width of the outline's tip, in usual tips
     line_press: float = 1.0  # 0.1..5 factor on the force of outlines
     passes: tuple[Pass, ...] = (Pass(),)
@@ -67,7 +71,7 @@ _RANGES = {
     "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "detail": (0, 1), "dark_price": (0, 4), "tone": (0, 4),
     "soften": (0, 4), "gap": (0, 4), "single": (0, 1),
     "tip_mm": (0.5, 30), "crayons": (1, 64), "recipes": (1, 100), "chroma": (0, 3), "skin": (0, 3), "wrist_deg": (-90, 90), "wrist": (0, 100),
-    "press": (0.1, 5), "force_spread": (0, 1), "swell": (0, 1), "wobble": (0, 1), "overshoot": (0, 3), "lines": (0, 5),
+    "press": (0.1, 5), "force_spread": (0, 1), "swell": (0, 1), "wobble": (0, 1), "overshoot": (0, 3), "lines": (0, 5), "flat": (0, 1), "fan_deg": (0, 90),
     "line_tip": (0.2, 3), "line_press": (0.1, 5),
 }  # fmt: skip
 
@@ -133,3 +137,26 @@ def with_force(style: Style, force: str | float) -> Style:
     if not 0.1 <= factor <= 5:
         raise ValueError(f"force: {force!r} is neither {', '.join(FORCES)} nor a number from 0.1 to 5")
     return replace(style, press=style.press * factor)
+
+
+def with_age(style: Style, age: int) -> Style:
+    """The style as drawn at an age from 3 to 10: the younger, the fatter the crayon, the fewer colours, the
+    wider the gaps and the further beyond the border."""
+    if not 3 <= age <= 10:
+        raise ValueError(f"age: {age} is not between 3 and 10")
+    young = (10 - age) / 7
+    passes = tuple(
+        replace(p, spacing=p.spacing * (0.9 + 0.35 * young), soften=p.soften * (0.6 + young), cohere=p.cohere * (0.6 + young))
+        for p in style.passes
+    )
+    return replace(
+        style,
+        passes=passes,
+        tip_mm=style.tip_mm * (0.75 + 0.6 * young),
+        crayons=round(9 - 4 * young),
+        recipes=round(13 - 7 * young),
+        overshoot=0.2 + 0.6 * young,
+        wobble=0.06 + 0.2 * young,
+        force_spread=0.15 + 0.25 * young,
+        fan_deg=10 + 20 * young,
+    )

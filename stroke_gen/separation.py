@@ -143,7 +143,7 @@ def base_pressure(lab: Floats, group: NDArray[np.int64], recipes: Recipes, swatc
 
 def plates(
     current: Floats, aim: Floats, group: NDArray[np.int64], swatches: Swatches, scene: Scene, recipes: Recipes,
-    coat: Pass, cells: float, streaks: Floats, threads: int,
+    coat: Pass, cells: float, flat: float, streaks: Floats, threads: int,
 ) -> dict[int, Floats]:  # fmt: skip
     """The pressure (h, w) wanted of each crayon that is wanted at all: one crayon at most in each place.
 
@@ -168,9 +168,18 @@ def plates(
     for k in np.unique(chosen):
         here = (chosen == k) & (scene.detail >= coat.detail) & (blur(gain[k], coat.edge * cells) > coat.gain)
         if here.any():
-            pressure = np.exp(blur(steps[best[k]] if level is None else level, 0.3 * cells))
-            wants[int(k)] = np.where(here, pressure, 0).astype(np.float32)
+            log_p = blur(steps[best[k]] if level is None else level, 0.3 * cells)
+            if flat > 0:
+                log_p = (1 - flat) * log_p + flat * _group_means(log_p, group, here)
+            wants[int(k)] = np.where(here, np.exp(log_p), 0).astype(np.float32)
     return wants
+
+
+def _group_means(values: Floats, group: NDArray[np.int64], here: NDArray[np.bool_]) -> Floats:
+    """Each place's value replaced by the mean of its group over the places that count."""
+    total = np.bincount(group[here], values[here], int(group.max()) + 1)
+    count = np.bincount(group[here], minlength=len(total))
+    return (total / np.maximum(count, 1))[group].astype(np.float32)
 
 
 def _worthiest(
