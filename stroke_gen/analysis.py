@@ -16,6 +16,7 @@ from .swatches import Swatches
 
 Floats = NDArray[np.float32]
 WORK_LONG = 640  # cells along the work grid's long side
+FACE_SIDE = 320  # pixels in which faces are looked for
 WARM = np.deg2rad(58)  # OKLab hue of skin
 
 
@@ -63,7 +64,8 @@ def read(linear: Floats, width_mm: float, height_mm: float, tip_mm: float, wrist
     lab = oklab(target)
     tip = tip_mm / cell_mm
     tangent, coherence = orientation(lab, tip, np.deg2rad(wrist_deg), wrist)
-    return Scene(target, lab, tangent, coherence, detail(lab, tip, focus), cell_mm)
+    boxes = [*focus, *faces(target)]
+    return Scene(target, lab, tangent, coherence, detail(lab, tip, boxes), cell_mm)
 
 
 def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tuple[Floats, Floats]:
@@ -108,6 +110,24 @@ def detail(lab: Floats, tip: float, focus: Sequence[tuple[float, float, float, f
         box[int(y * h) : int(np.ceil((y + height) * h)), int(x * w) : int(np.ceil((x + width) * w))] = 1
         level = np.maximum(level, blur(box, tip))
     return np.asarray(level, np.float32)
+
+
+def faces(target: Floats) -> list[tuple[float, float, float, float]]:
+    """Boxes (x, y, w, h), in fractions of the picture, where scikit-image's LBP cascade sees a face.
+
+    A bonus: it misses many faces, so it is asked strictly and nothing depends on it.
+    """
+    from skimage import data, feature
+
+    h, w = target.shape[:2]
+    scale = min(1.0, FACE_SIDE / max(h, w))
+    small = (np.clip(fit(target, (max(1, round(h * scale)), max(1, round(w * scale)))), 0, 1) ** (1 / 2.2) * 255).astype(np.uint8)
+    if min(small.shape[:2]) < 40:
+        return []
+    detector = feature.Cascade(data.lbp_frontal_face_cascade_filename())
+    side = min(small.shape[:2])
+    found = detector.detect_multi_scale(img=small, scale_factor=1.2, step_ratio=1, min_size=(side // 8, side // 8), max_size=(side, side), min_neighbor_number=5)
+    return [(f["c"] / small.shape[1], f["r"] / small.shape[0], f["width"] / small.shape[1], f["height"] / small.shape[0]) for f in found]
 
 
 def turned(tangent: Floats, degrees: "float | Floats") -> Floats:

@@ -20,6 +20,7 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 SCALE = 2  # edge pixels per work cell
 BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
+AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
 
@@ -45,7 +46,9 @@ def outlines(
     width = tip.width_mm / scene.cell_mm
     budget = style.lines * BUDGET * max(scene.detail.shape)
     picked = []
-    candidates = _areas(scene, group, width) if style.closed else _lines(scene, width)
+    candidates = _lines(scene, width)
+    if style.closed:  # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
+        candidates = _areas(scene, group, width) + [c for c in candidates if _sample(scene.detail, c.path).mean() > 0.45]
     for line in sorted(candidates, key=lambda line: -line.worth):
         budget -= len(line.path)
         if budget < 0:
@@ -96,7 +99,7 @@ def _areas(scene: Scene, group: NDArray[np.int64], width: float) -> list[Line]:
             if cv2.contourArea(path) < 20 * width * width:
                 continue
             around = np.concatenate([path, path[: max(3, int(2 * width))]])  # the end runs a little past the beginning
-            line = _line(_fair(np.repeat(around, SCALE, 0), 1.5 * width * SCALE), scene, lightness, width)
+            line = _line(_fair(np.repeat(around, SCALE, 0), 1.5 * width * SCALE), scene, lightness, width, AREA_WORTH)
             if line is not None and not _on_border(line.path, group.shape):
                 lines.append(line)
     return lines
@@ -121,17 +124,17 @@ def _fair(path: Floats, sigma: float) -> Floats:
     return smooth[:: SCALE].astype(np.float32)
 
 
-def _line(path: Floats, scene: Scene, lightness: Floats, width: float) -> Line | None:
+def _line(path: Floats, scene: Scene, lightness: Floats, width: float, factor: float = 1.0) -> Line | None:
     """The chain as a line, if it is long and strong enough to be one."""
     if len(path) < max(3.0, 2.5 * width):
         return None
     sides = [_sample(lightness, path + side * _normal(path) * 0.6 * width) for side in (1, -1)]
     contrast = np.abs(sides[0] - sides[1])
     mean = float(contrast.mean())
-    if mean < 0.05:
+    if mean * factor < 0.05:
         return None
     detail = float(_sample(scene.detail, path).mean())
-    return Line(path, contrast, mean * len(path) ** 0.5 * (1 + 1.5 * detail))
+    return Line(path, contrast, factor * mean * len(path) ** 0.5 * (1 + 1.5 * detail))
 
 
 def _normal(path: Floats) -> Floats:
@@ -151,7 +154,7 @@ def _crayon(line: Line, scene: Scene, now: Floats, box: Swatches, style: Style) 
     """Lightness, name and pressure of the crayon that comes nearest to the line's darker side, a little darker still."""
     width = style.line_tip * style.tip_mm / scene.cell_mm
     sides = [_sample(scene.lab, line.path + side * _normal(line.path) * 0.6 * width).mean(0) for side in (1, -1)]
-    aim = min(sides, key=lambda lab: float(lab[0])) - np.array([0.05, 0, 0], np.float32)
+    aim = min(sides, key=lambda lab: float(lab[0])) - np.array([0.15 if style.closed else 0.05, 0, 0], np.float32)
     ground = _sample(now, line.path).mean(0)
     colours = oklab(box.over(ground))[:, 2:]
     off = np.linalg.norm((colours - aim) * np.array([1, 0.8, 0.8]), axis=2)

@@ -22,7 +22,8 @@ LAYER_PRICE = 0.008  # for the second crayon
 CLASH_PRICE = 0.03  # for two crayons of unlike hue, by their distance in a and b
 LIKE = 0.07  # OKLab distance within which groups are alike
 AGREEMENT = 0.04  # what sharing both crayons with all groups alike is worth
-RIVAL = 0.015  # a base this little dearer lies between the lines of the first
+RIVAL = 0.015  # a base this little dearer lies between the lines of the first ...
+RIVAL_HUE = 0.14  # ... if its hue is this near, in a and b
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +106,7 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
     cost[:, ~(allowed[pairs[:, 0]] & allowed[pairs[:, 1]])] = 9
     best = _agree(cost, pairs, centres)
     base, shade = pairs[best].T
-    return Recipes(centres, base, shade, _rivals(cost, pairs, base, shade))
+    return Recipes(centres, base, shade, _rivals(cost, pairs, base, shade, hues))
 
 
 def _group(colours: Floats, groups: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
@@ -168,12 +169,15 @@ def _agree(cost: Floats, pairs: NDArray[np.int64], centres: Floats) -> NDArray[n
     return best
 
 
-def _rivals(cost: Floats, pairs: NDArray[np.int64], base: NDArray[np.int64], shade: NDArray[np.int64]) -> NDArray[np.int64]:
-    """For each group the cheapest other base under the same shade, where it is hardly dearer; else the base."""
+def _rivals(
+    cost: Floats, pairs: NDArray[np.int64], base: NDArray[np.int64], shade: NDArray[np.int64], hues: Floats
+) -> NDArray[np.int64]:
+    """For each group the cheapest other base of like hue under the same shade, if hardly dearer; else the base."""
     rival = base.copy()
     for g in range(len(base)):
         least = cost[g].min()
-        same = (pairs[:, 1] == shade[g]) & (pairs[:, 0] != base[g]) & (pairs[:, 0] != shade[g])
+        like = np.linalg.norm(hues[pairs[:, 0]] - hues[base[g]], axis=1) < RIVAL_HUE
+        same = (pairs[:, 1] == shade[g]) & (pairs[:, 0] != base[g]) & (pairs[:, 0] != shade[g]) & like
         others = np.where(same & (cost[g] < least + RIVAL), cost[g], 9)
         if others.min() < 9:
             rival[g] = pairs[others.argmin(), 0]

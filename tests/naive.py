@@ -131,16 +131,17 @@ def height_ahead(tops, y, x, direction) -> tuple[float, float]:
     return rise, math.hypot(ax, ay)
 
 
-def deposit(columns, over, tops, direction, own, mask, push, rate, film, mu_paper, mu_wax, relief, wear):
+def deposit(columns, over, tops, direction, own, mask, push, rate, film, mu_paper, mu_wax, relief, wear, heap):
     """Fig. 6 for all cells in contact: what breaks off joins `own` and wears `mask`; returns the loss."""
     lost = 0.0
     for cell, overlap in over.items():
-        room = overlap + own.get(cell, 0.0)
+        wax_here = columns[cell].wax() + own.get(cell, 0.0)
+        room = overlap + own.get(cell, 0.0) - heap * wax_here
         rise, way = height_ahead(tops, *cell, direction)
         sine = math.sin(math.atan2(relief * rise, way) + math.atan2(push, 1))
         if sine <= 0 or room <= 0:
             continue
-        bare = film / (film + columns[cell].wax() + own.get(cell, 0.0))
+        bare = film / (film + wax_here)
         mu = bare * mu_paper + (1 - bare) * mu_wax
         given = min(rate * mu * sine, 1.0) * room
         own[cell] = own.get(cell, 0.0) + given
@@ -160,7 +161,7 @@ def under_tip(columns, mask, top, left):
 
 def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, optics):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
-    mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _ = (float(c) for c in constants)
+    mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _, heap = (float(c) for c in constants)
     points, mask = points.astype(float), mask.astype(float)
     side = mask.shape[0]
     ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
@@ -191,7 +192,7 @@ def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, o
             own = smear(columns, over, tops, direction, wax, 1 - (1 - nu) ** stride, alpha, beta, optics)
         worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
         given += deposit(columns, over, tops, direction, own, worn, push if push > 0 else force,
-                         rate * stride, film, mu_paper, mu_wax, relief, wear)  # fmt: skip
+                         rate * stride, film, mu_paper, mu_wax, relief, wear, heap)  # fmt: skip
         for cell, height in worn.items():
             mask[cell[0] - top, cell[1] - left] = height
         for cell, height in own.items():

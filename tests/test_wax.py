@@ -81,9 +81,9 @@ class Window:
                    v[0], v[1], np.float32(nu), np.float32(alpha), np.float32(beta), crayon, np.float32(wax.THIN_UM),
                    self.inflow, self.weight, self.moves, *self.sheet.columns()[1:])  # fmt: skip
 
-    def deposit(self, direction, push, rate, film, mu_paper, mu_wax, relief, wear):
+    def deposit(self, direction, push, rate, film, mu_paper, mu_wax, relief, wear, heap):
         v = np.float32(direction)
-        rest = (np.float32(c) for c in (push, rate, film, mu_paper, mu_wax, relief, wear))
+        rest = (np.float32(c) for c in (push, rate, film, mu_paper, mu_wax, relief, wear, heap))
         return wax._deposit(self.contacts, self.touch, self.over, self.surface, self.side, self.home,
                             self.sheet.cols, v[0], v[1], *rest, self.inflow, self.mask, self.sheet.total)  # fmt: skip
 
@@ -174,8 +174,8 @@ def test_smear_is_fig_7(bench, nu):
     assert from_blend > 1  # layers sank, blends moved
 
 
-@pytest.mark.parametrize("push", [0.3, 1.0, 4.0])
-def test_deposit_is_fig_6(bench, push):
+@pytest.mark.parametrize("push, rate, heap", [(0.3, 0.4, 0), (1.0, 0.4, 0.6), (4.0, 0.4, 1), (1.0, 3.0, 0.3)])
+def test_deposit_is_fig_6(bench, push, rate, heap):
     rng = np.random.default_rng(5)
     sheet = old_wax(bench.sheet(40 * rng.random((19, 23))), rng)
     given = []
@@ -184,7 +184,7 @@ def test_deposit_is_fig_6(bench, push):
         window.inflow[window.touch[: window.contacts]] = rng.random(window.contacts)
         columns, own = naive.columns_of(sheet), window.own()
         tops = {at: column.top() for at, column in columns.items()}
-        direction, constants = towards(35 * turn), (push, 0.4, 5.0, 2.0, 0.5, 0.2, 0.7)
+        direction, constants = towards(35 * turn), (push, rate, 5.0, 2.0, 0.5, 0.2, 0.7, heap)
         worn = {window.cell(at): float(window.mask[at]) for at in window.touch[: window.contacts]}
         lost = naive.deposit(columns, window.overlaps(), tops, direction, own, worn, *constants)
         assert window.deposit(direction, *constants) == pytest.approx(lost, rel=1e-4)
@@ -215,8 +215,7 @@ def test_a_stroke_is_fig_3(bench, path, smears):
     mask = small_mask(rng)
     per_lambda = np.float32(1 / (bench.physics.lam * sheet.cell_mm**2))
     points = np.stack([x, y, um * (mask < ABSENT).sum() / per_lambda], 1)
-    constants = bench.physics.constants(sheet.cell_mm)
-    constants[9] = 1e-4  # the twin's force is exact
+    constants = bench.changed(epsilon_um=1e-4).physics.constants(sheet.cell_mm)  # the twin's force is exact
     loss, one, crayon = np.zeros(1), np.zeros(1, np.int64), 2
     wax._rub(one, points, np.array([0, len(points)]), one + crayon, one, mask.reshape(1, -1),
              np.array([WINDOW]), np.float32(0.2), smears, constants, per_lambda,
@@ -251,7 +250,7 @@ def test_the_mask_loses_its_share_of_what_breaks_off(bench):
     sheet = bench.sheet(40 * rng.random((20, 20)))
     window = Window(sheet, small_mask(rng), 4, 4, 300.0)
     before = window.mask.astype(float)
-    lost = window.deposit(towards(20), 1.0, 0.3, 5.0, 2.0, 0.5, 1.0, 0.25)
+    lost = window.deposit(towards(20), 1.0, 0.3, 5.0, 2.0, 0.5, 1.0, 0.25, 0.5)
     assert (window.mask - before)[before < ABSENT].sum() == pytest.approx(0.25 * lost, rel=1e-4)
     assert window.inflow.sum(dtype=float) == pytest.approx(lost, rel=1e-5)
     untouched = np.setdiff1d(np.arange(before.size), window.touch[: window.contacts])
@@ -298,11 +297,24 @@ def test_the_force_is_reached_over_five_decades(bench, kind, teeth):
             assert window.over[:n].sum(dtype=float) == pytest.approx(wanted, abs=allowed, rel=1e-6)
 
 
-def test_the_first_touch_of_every_dab_leaves_wax(bench):
+@pytest.mark.parametrize("kind", ["sharp", "blunt", "rim", "side"])
+def test_the_first_touch_of_every_dab_leaves_wax(bench, kind):
     sheet = bench.felt(160, 160)
     bench = bench.changed(relief=0.0)
-    dabs = [bench.stroke([[2 + 1.7 * i, 2 + 1.7 * j]], 3.0) for i in range(8) for j in range(8)]
+    places = itertools.product(np.linspace(2, 14, 8), np.linspace(2, 14, 8), (0.02, 1.0, 20.0))
+    dabs = [bench.stroke([[x, y]], um, tip=Tip(kind, 1.6)) for x, y, um in places]
     assert min(bench.draw(sheet, [dab]) for dab in dabs) > 0
+
+
+def test_a_light_touch_gives_in_proportion_to_its_force(bench):
+    """The accuracy is a share of the force where that is less than epsilon."""
+    if bench.physics.push == 0:
+        bench = bench.changed(push=1.0)  # the direction of the force fixed, as its size changes
+    given = []
+    for um in (0.0005, 0.001, 0.01):
+        sheet = bench.sheet(np.zeros((40, 40)))
+        given.append(bench.draw(sheet, [bench.stroke([[2, 2]], um)]) / um)
+    assert given == pytest.approx([given[0]] * 3, rel=0.025)
 
 
 @pytest.mark.parametrize("coated", [False, True])
@@ -462,6 +474,17 @@ def test_wear_goes_on_from_stroke_to_stroke(bench):
     assert box.worn_um.keys() == {("red", stroke.tip)}
     box.take(other, per_stroke)
     assert len(box.worn_um) == 2
+
+
+@pytest.mark.parametrize("cell_mm", [0.2, 0.1])
+def test_wear_is_planned_by_force_times_the_length_drawn(bench, cell_mm):
+    box = rub.Box(bench.palette, bench.physics, cell_mm)
+    sheet = bench.sheet(np.zeros((round(12 / cell_mm),) * 2), cell_mm)
+    strokes = [bench.stroke([[1, 1], [5, 1], [5, 3]], 2.0), bench.stroke([[11, 11], [7, 11]], 4.0)]
+    rub.rub(sheet, strokes, box)
+    newton_mm = 6 * float(strokes[0].force_n[0]) + 4 * float(strokes[1].force_n[0])
+    worn_um = rub.worn_per_newton_mm(bench.physics) * newton_mm / (np.pi / 4 * 1.6**2)
+    assert list(box.worn_um.values()) == pytest.approx([worn_um], rel=1e-3)
 
 
 def test_planned_wear_is_about_what_is_rubbed_off(bench):

@@ -64,7 +64,7 @@ def _places() -> Iterator[Path]:
 
 def _ours(path: Path) -> bool:
     """Whether only we, or the machine's administrator, can write here."""
-    status = path.lstat()
+    status = path.stat()
     if not stat.S_ISDIR(status.st_mode):
         return False
     return not hasattr(os, "getuid") or (status.st_uid in (os.getuid(), 0) and not status.st_mode & 0o022)

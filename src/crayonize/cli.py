@@ -251,7 +251,8 @@ class _Parser(argparse.ArgumentParser):
                 raise ValueError(f"unknown option {printable(name)}{did_you_mean(name, known)}")
         options, rest = self.parse_known_intermixed_args(words)
         if rest:
-            raise ValueError(f"{printable(rest[0])} is one too many; see {self.prog} --help")
+            what = "is no option" if rest[0].startswith("-") else "is one too many"
+            raise ValueError(f"{printable(rest[0])} {what}; see {self.prog} --help")
         return options
 
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-BYTES_PER_CELL = 96  # the sheet 57; making its tooth or its light 28; the picture to be written
-OVERHEAD = 450_000_000  # the libraries, the photo, the planner's work, the strokes
+BYTES_PER_CELL = 84  # the sheet 57; its light, or its picture on the way into a file, 12 to 24
+OVERHEAD = 400_000_000  # the libraries, the photo, the planner's work, the strokes
 
 
 def check_fits(rows: int, cols: int, available: int | None = None) -> None:

@@ -21,7 +21,7 @@ from . import schedule, tip
 from .palette import Palette
 from .wax import Physics, Sheet, _rub
 
-STEP = 0.2  # of the tip's width, between two contacts
+STEP = 0.14  # of the tip's width, between two contacts: below the wavelength of the bumps
 SHARPEN_UM = 36.0  # mean height lost before a tip is turned or sharpened
 WEAR_LEVELS = 4  # masks between sharp and worn
 FACES = 8  # different sets of bumps

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from stroke_gen.colour import oklab
 from stroke_gen.drawing import Stroke
 from stroke_gen.jit import kernel
 
@@ -31,7 +32,7 @@ FIRST, LAST = 0.4, 1.5  # seconds for which the bare sheet and the finished draw
 FILL_MM_S, LINE_MM_S = 200.0, 60.0  # how fast a hand fills a plane, and draws a line
 LINES = ("line", "detail", "outline")  # notes of strokes that are drawn slowly
 LIFT_S, DAB_S = 0.25, 0.1  # time from stroke to stroke, and for a dab
-TILE = 8  # pixels of the film that are renewed together
+TILE = 16  # pixels of the film that are renewed together
 SHADES = 4096  # steps of light in the table of sRGB codes
 
 Floats = NDArray[np.float32]
@@ -235,20 +236,28 @@ def _rgb(colour: str) -> tuple[int, int, int]:
 
 
 def _colours(easel: "Easel") -> Frame:
-    """Up to 255 colours that can appear: each crayon thin to thick on the paper, and each over each other."""
-    from PIL import Image
+    """255 of the colours that can appear: (255, 3) sRGB.
 
+    What can appear: each crayon thin to thick on the paper, and each over each other. Of a box that is not
+    too large all of the first are taken; then in turn the colour farthest from those taken (Gonzalez 1985).
+    """
     crayons = range(len(easel.box.palette.crayons))
-    columns = [[(i, h)] for i in crayons for h in (1.0, 3.0, 8.0, 20.0)]
-    columns += [[(i, 9.0), (j, 6.0)] for i in crayons for j in crayons if i != j]
-    sheet = Sheet(np.zeros((1, len(columns) + 1), np.float32), 1.0, *np.split(easel.sheet.optics, 2, axis=1))
+    columns: list[list[tuple[int, float]]] = [[], *([(i, h)] for i in crayons for h in (0.7, 1.5, 3.0, 6.0, 12.0))]
+    alone = len(columns)
+    columns += [[(i, h), (j, 5.0)] for i in crayons for j in crayons for h in (3.0, 12.0) if i != j]
+    sheet = Sheet(np.zeros((1, len(columns)), np.float32), 1.0, *np.split(easel.sheet.optics, 2, axis=1))
     for cell, column in enumerate(columns):
         sheet.count[cell] = len(column)
         for layer, (crayon, height) in enumerate(column):
             sheet.crayon[cell, layer], sheet.layer[cell, layer] = crayon, height
-    seen = encode_srgb(optics.render(sheet, easel.ground, light=False))
-    picked = Image.fromarray(seen).quantize(255, Image.Quantize.MEDIANCUT).getpalette() or []
-    return np.array(picked, np.uint8).reshape(-1, 3)
+    seen = optics.render(sheet, easel.ground, light=False)[0]
+    lab = oklab(seen)
+    taken = list(range(alone)) if alone <= 150 else [0]
+    far = ((lab[:, None] - lab[None, taken]) ** 2).sum(2).min(1)
+    while len(taken) < min(255, len(lab)):
+        taken.append(int(far.argmax()))
+        far = np.minimum(far, ((lab - lab[taken[-1]]) ** 2).sum(1))
+    return encode_srgb(seen[None, taken])[0]
 
 
 def _draw_crayon(frame: Frame, tip: NDArray[np.float32], colour: tuple[int, int, int]) -> None:

@@ -39,13 +39,15 @@ class Physics:
     beta: float  # directional smear factor
     lam: float  # N per um of overlap and mm^2 of contact: .0005 a cell of 0.1 mm
     epsilon_um: float  # accuracy of the force, as a sum of overlaps over cells
+    heap: float  # share of a cell's wax that counts as out of reach: Fig. 6 rubs on the paper alone (1)
     wear: float  # share of a cell's loss that deepens the cell itself; the rest the whole tip shares
 
     def constants(self, cell_mm: float) -> Floats:
         """The kernel's arguments for cells of `cell_mm`."""
         relief, nu = self.relief / (1000 * cell_mm), 1 - (1 - self.nu) ** (cell_mm / self.nu_mm)
         values = (self.mu_paper, self.mu_wax, self.film_um, self.rate_per_mm * cell_mm, self.push, relief,
-                  nu, self.alpha, self.beta, self.epsilon_um, self.wear, THIN_UM)  # fmt: skip
+                  nu, self.alpha, self.beta, self.epsilon_um, self.wear, THIN_UM,
+                  self.heap)  # fmt: skip
         return np.array(values, np.float32)
 
 
@@ -259,10 +261,10 @@ def _neighbour(k):  # type: ignore[no-untyped-def]
 
 @kernel
 def _deposit(contacts, touch, over, surface, side, home, cols, vx, vy, push, rate, film, mu_paper, mu_wax,  # type: ignore[no-untyped-def]
-             relief, wear, inflow, mask, total):  # fmt: skip
+             relief, wear, heap, inflow, mask, total):  # fmt: skip
     """Rub wax off the tip by friction (Eq. 3, Fig. 6).
 
-    The share of the overlap that breaks off is rate * mu * sin(S, F), where S is the surface ahead and
+    The share of the overlap that breaks off (less `heap` of the wax already there) is rate * mu * sin(S, F), where S is the surface ahead and
     F the crayon's force; faces steeper than F get none. What breaks off gathers in `inflow`, deepens the
     mask by `wear` of it, and is returned as the tip's loss: wax is neither made nor lost.
     """
@@ -278,13 +280,13 @@ def _deposit(contacts, touch, over, surface, side, home, cols, vx, vy, push, rat
     lost = np.float32(0)
     for t in range(contacts):
         at = touch[t]
-        room = over[t] + inflow[at]
+        wax_here = total[home + (at // side) * cols + at % side] + inflow[at]
+        room = over[t] + inflow[at] - heap * wax_here
         rise = (np.float32(1) - slant) * surface[at + ahead] + slant * surface[at + aside] - surface[at]
         rise = relief * rise if rise < np.float32(1e6) else np.float32(0)
         slope = press * (push + rise) / np.sqrt(length2 + rise * rise)
         if slope <= 0 or room <= 0:
             continue
-        wax_here = total[home + (at // side) * cols + at % side] + inflow[at]
         bare = film / (film + wax_here)
         given = min(rate * slope * (bare * mu_paper + (np.float32(1) - bare) * mu_wax), np.float32(1)) * room
         inflow[at] += given
@@ -330,6 +332,7 @@ def _rub(picked, points, first, wax_of, mask_of, masks, sides, step_cells, smear
     mu_paper, mu_wax, film, rate_cell = constants[0], constants[1], constants[2], constants[3]
     push, relief, nu_cell, alpha = constants[4], constants[5], constants[6], constants[7]
     beta, epsilon, wear, thin = constants[8], constants[9], constants[10], constants[11]
+    heap = constants[12]
     for s in picked:
         tip, wax = mask_of[s], wax_of[s]
         side = sides[tip]
@@ -383,7 +386,7 @@ def _rub(picked, points, first, wax_of, mask_of, masks, sides, step_cells, smear
                 _smear(contacts, touch, near, surface, side, home, cols, vx, vy, nu, alpha, beta, wax, thin,
                        inflow, weight, moves, total, count, crayon, layer, blend, optics)  # fmt: skip
             given += _deposit(contacts, touch, near, surface, side, home, cols, vx, vy, push if push > 0 else force,
-                              rate, film, mu_paper, mu_wax, relief, wear, inflow, mask, total)  # fmt: skip
+                              rate, film, mu_paper, mu_wax, relief, wear, heap, inflow, mask, total)  # fmt: skip
             for at in range(cells):
                 if inflow[at] > 0:
                     _add(home + (at // side) * cols + at % side, wax, inflow[at],

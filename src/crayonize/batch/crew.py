@@ -20,9 +20,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from .job import Job, Outcome
+from .memory import SHARE
 
 START_LIMIT = 300.0  # s for a worker to come up: its libraries may lie on a slow disk
 GRACE = 1.0  # s that pictures in work may still take after a stop
@@ -63,7 +65,7 @@ class Crew:
     size: int
     hello: Message
     time_limit: float
-    memory: int | None = None  # bytes that all together may take
+    memory: int | None = None  # bytes there are; several workers together take only a share of them
     clean_up: Callable[[Job, int], None] = lambda job, pid: None  # called for the job of a killed worker
     _hands: list[_Hand] = field(default_factory=list)
     _inbox: "queue.SimpleQueue[tuple[_Hand | None, Message | None]]" = field(default_factory=queue.SimpleQueue)
@@ -132,7 +134,7 @@ class Crew:
 
         -P: no module is taken from the folder we stand in. A process group of its own: Ctrl-C is for us.
         """
-        path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry)
+        path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path if entry)
         try:
             process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "crayonize.batch.worker"], process_group=0,
@@ -188,11 +190,11 @@ class Crew:
                 raise CrewError(reason)
             case {"asks": int(asks)}:
                 self._asking[hand] = asks
-            case {"status": "ok" | "failed" as status} if hand.job:
+            case {"status": "ok" | "failed" as status, "error": str(error), "bytes": int(size),
+                  "strokes": int(strokes)} if hand.job:  # fmt: skip
                 job, hand.job, hand.holds = hand.job, None, 0
                 self._deaths.pop(job, None)
-                yield job, Outcome(status, str(message.get("error", "")), time.monotonic() - hand.started,
-                                   int(message.get("bytes", 0)), int(message.get("strokes", 0)))  # fmt: skip
+                yield job, Outcome(status, error, time.monotonic() - hand.started, size, strokes)
             case _:  # the end of its pipe, or nonsense
                 yield from self._bury(hand)
 
@@ -201,7 +203,7 @@ class Crew:
         for hand, asks in list(self._asking.items()):
             fits = self.memory is None or asks <= self.memory
             given = sum(other.holds for other in self._hands)
-            if fits and self.memory is not None and given + asks > self.memory:
+            if fits and given and self.memory is not None and given + asks > self.memory * SHARE:
                 return  # nobody overtakes, or a large photo would never have its turn
             del self._asking[hand]
             hand.holds = asks if fits else 0

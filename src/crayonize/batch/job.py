@@ -19,7 +19,8 @@ TIME_LIMIT = 1800.0
 class Found:
     """A file that was found, and what tells later whether it has changed."""
 
-    name: str  # relative to its folder, parts joined by "/": how it is reported and journaled
+    name: str  # how it is reported: relative to its folder, or as given on the command line
+    place: str  # its place in the tree that is mirrored, parts joined by "/"
     source: str  # where it lies: a path or URL
     size: int  # bytes
     version: str  # time of its last change in ns, or what a remote folder has in its place

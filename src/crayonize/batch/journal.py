@@ -13,8 +13,6 @@ from pathlib import Path
 
 from .job import Job
 
-FOLDER = ".crayonize"  # in the output folder: journals and locks
-
 
 class Journal:
     """What is known of earlier runs, and the file that this run adds to."""
@@ -46,13 +44,13 @@ class Journal:
     def is_done(self, job: Job, size: int | None) -> bool:
         """Whether a picture of `size` bytes is what this job would make again."""
         photo = job.photo
-        key = _key(photo.name, photo.size, photo.version, self._recipe)
+        key = _key(photo.place, photo.size, photo.version, self._recipe)
         return size is not None and self._known.get(job.out) == (key, size)
 
     def add(self, job: Job, size: int) -> None:
         """Note a picture that stands whole. OSError if the disk refuses the line."""
         photo = job.photo
-        entry = {"in": photo.name, "size": photo.size, "version": photo.version, "recipe": self._recipe,
+        entry = {"in": photo.place, "size": photo.size, "version": photo.version, "recipe": self._recipe,
                  "out": job.out, "bytes": size}  # fmt: skip
         line = json.dumps(entry).encode() + b"\n"
         with open(self._file, "a+b", buffering=0) as file:
@@ -62,7 +60,7 @@ class Journal:
                     line = b"\n" + line
             if file.write(line) != len(line):
                 raise OSError(28, "No space left for a whole line", os.fspath(self._file))
-        self._known[job.out] = _key(photo.name, photo.size, photo.version, self._recipe), size
+        self._known[job.out] = _key(photo.place, photo.size, photo.version, self._recipe), size
 
 
 def _key(name: str, size: int, version: str, recipe: str) -> bytes:

@@ -1,7 +1,7 @@
 """One run at a time in an output folder, by locks that the system drops when their process ends."""
 
 import errno
-import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,7 +28,7 @@ def held(folder: Path, shard: str | None = None) -> Iterator[None]:
 def _lock(file: IO[bytes], shared: bool) -> None:
     """Lock or raise Busy; a disk that knows no locks (some network disks) is taken as it is."""
     try:
-        if os.name == "nt":
+        if sys.platform == "win32":
             import msvcrt
 
             if not shared:

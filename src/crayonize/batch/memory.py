@@ -4,7 +4,10 @@ import os
 
 from ..memory import BYTES_PER_CELL, OVERHEAD, available_bytes
 
-_SHARE = 0.7  # of the free memory that a batch uses at most
+__all__ = ["SHARE", "available_bytes", "cores", "need", "workers"]
+
+SHARE = 0.7  # of the memory there is that several workers take together
+_USUAL_PHOTO = 24_000_000  # pixels
 
 # Bytes a pixel while a photo is decoded and turned into light, by format, measured on 100 million pixels.
 _DECODING = {"JPEG": 4.5, "PNG": 4.5, "TIFF": 8.0, "WEBP": 16.0, "AVIF": 12.0, "HEIF": 12.0}
@@ -15,10 +18,9 @@ def need(format_: str, pixels: int, size: int) -> int:
     return int(OVERHEAD + _DECODING.get(format_, 16.0) * pixels + BYTES_PER_CELL * size * size)
 
 
-def budget() -> int | None:
-    """Bytes all workers together may take; None if the system does not tell."""
-    free = available_bytes()
-    return None if free is None else int(free * _SHARE)
+def workers(available: int | None, size: int) -> int:
+    """How many workers may draw a usual photo at once."""
+    return 512 if available is None else max(1, int(available * SHARE) // need("JPEG", _USUAL_PHOTO, size))
 
 
 def cores() -> int:

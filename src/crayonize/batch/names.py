@@ -51,7 +51,7 @@ class Places:
         self._folders: dict[str, str] = {}  # folded name of a folder of pictures -> a photo in it
 
     def take(self, out: str, photo: str) -> str | None:
-        """Give a photo its place; the photo that is in the way if it is taken."""
+        """Give a photo, named by its path, its place; the photo that is in the way if it is taken."""
         key = folded(out)
         parents = [str(p) for p in PurePosixPath(key).parents][:-1]
         for rival in (self._taken.get(key), self._folders.get(key), *map(self._taken.get, parents)):

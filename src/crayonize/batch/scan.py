@@ -59,7 +59,7 @@ def _look(entry: os.DirEntry[str], name: str) -> Entry:
         return name, Outcome("ignored", "no ordinary file")
     if not is_picture(entry.name):
         return name, Outcome("ignored", "no picture, by the end of its name")
-    return found(name, entry.path, status)
+    return found(name, name, entry.path, status)
 
 
 def is_picture(name: str) -> bool:
@@ -67,6 +67,6 @@ def is_picture(name: str) -> bool:
     return PurePosixPath(name).suffix.lower() in SUFFIXES
 
 
-def found(name: str, path: str, status: os.stat_result) -> Found:
+def found(name: str, place: str, path: str, status: os.stat_result) -> Found:
     """A local file as found."""
-    return Found(name, path, status.st_size, str(status.st_mtime_ns))
+    return Found(name, place, path, status.st_size, str(status.st_mtime_ns))

@@ -1,0 +1,86 @@
+"""What a user may choose for a batch. No heavy imports: the command line reads the defaults here."""
+
+import argparse
+import re
+from dataclasses import dataclass, fields
+from typing import Any
+
+from .job import MAX_BYTES, MAX_PIXELS, TIME_LIMIT
+
+EXISTING = ("auto", "skip", "overwrite", "fail")
+FORMATS = ("png", "jpg", "webp", "tif")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a batch is run; how its pictures are drawn is said by a Recipe."""
+
+    jobs: int | None = None  # workers; None: as many as there are cores and memory for
+    existing: str = "auto"
+    name: str = "{stem}"
+    format: str = "png"
+    shard: tuple[int, int] | None = None  # (2, 8): the second eighth of the photos
+    dry_run: bool = False
+    json: bool = False
+    watch: bool = False
+    dask: str | None = None
+    time_limit: float = TIME_LIMIT
+    quiet: bool = False
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that concern folders and lists of photos."""
+    group = parser.add_argument_group("folders", "Given a folder, or several photos and -o, all are drawn.")
+    add = group.add_argument
+    add("-j", "--jobs", type=_count, metavar="N", help="photos drawn at once (as cores and memory allow)")
+    add("--existing", choices=EXISTING, default="auto",
+        help="pictures already there: auto draws anew what has changed, and so goes on after a break (%(default)s)")
+    add("--format", choices=FORMATS, default="png", help="of the pictures (%(default)s)")
+    add("--name", default="{stem}", metavar="TEMPLATE",
+        help="name of a picture, such as \"{stem}.crayon\", of {stem}, {name}, {suffix}, {parent}, {palette}, "
+        "{paper}, {style}, {seed} (%(default)s)")
+    add("--shard", type=_shard, metavar="I/N", help="only the I-th of N parts, for runs on several machines")
+    add("--dry-run", action="store_true", help="only tell what would be done")
+    add("--json", action="store_true", help="one JSON line a file on stdout, and one at the end that counts them")
+    add("--watch", action="store_true", help="stay, and draw each photo that is put into the folder, until Ctrl-C")
+    add("--dask", metavar="URL", help="draw on this Dask cluster, such as tcp://scheduler:8786")
+    add("--max-pixels", type=_amount, default=MAX_PIXELS, metavar="N", help="refuse larger photos (250M)")
+    add("--max-bytes", type=_amount, default=MAX_BYTES, metavar="N", help="refuse larger files (1G)")
+    add("--time-limit", type=_seconds, default=TIME_LIMIT, metavar="S",
+        help="seconds one photo may take (%(default)g)")  # fmt: skip
+
+
+def options_of(parsed: argparse.Namespace) -> Options:
+    """The options among all that was parsed."""
+    known: dict[str, Any] = {f.name: getattr(parsed, f.name) for f in fields(Options) if hasattr(parsed, f.name)}
+    return Options(**known)
+
+
+def _count(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 512:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 to 512")
+    return int(text)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    parts = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text, re.ASCII)
+    if not parts or not 1 <= int(parts[1]) <= int(parts[2]):
+        raise argparse.ArgumentTypeError(f"{text!r} is not I/N with I from 1 to N, such as 2/8")
+    return int(parts[1]), int(parts[2])
+
+
+def _amount(text: str) -> int:
+    parts = re.fullmatch(r"(\d{1,15})([kMG]?)", text, re.ASCII)
+    if not parts:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, or one with k, M or G behind it")
+    return int(parts[1]) * {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}[parts[2]]
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = 0
+    if not 0 < seconds <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return seconds

@@ -1,0 +1,55 @@
+"""The output folder: who holds it, its journals, and the temporary files that a killed worker left."""
+
+import os
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from . import lock
+from .job import Job
+from .journal import Journal
+
+STATE = ".crayonize"  # folder of journals and locks
+_STALE = 3600.0  # s after which a temporary file that may belong to another machine is taken for left behind
+
+
+class OutputFolder:
+    """Where pictures go, and what is known about them."""
+
+    def __init__(self, path: str, shard: tuple[int, int] | None, recipe: str) -> None:
+        self._state = Path(path) / STATE
+        self._shard = shard and f"{shard[0]}-of-{shard[1]}"
+        self._recipe = recipe
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Make the folder if need be and hold it against other runs; lock.Busy if one is at work there."""
+        self._state.mkdir(parents=True, exist_ok=True)
+        with lock.held(self._state, self._shard):
+            yield
+
+    def journal(self) -> Journal:
+        """The journals of all runs and shards; we add to our own."""
+        own = self._state / (f"journal-{self._shard}.jsonl" if self._shard else "journal.jsonl")
+        others = (file for file in sorted(self._state.glob("journal*.jsonl")) if file != own)
+        return Journal(own, others, self._recipe)
+
+    def sweep(self, folders: Iterable[str]) -> None:
+        """Remove what killed runs left behind; while other shards may be at work, only what is old."""
+        before = time.time() - _STALE if self._shard else None
+        for folder in folders:
+            _remove_parts(folder, ".crayonize-", before)
+
+    def clean_up(self, job: Job, pid: int) -> None:
+        """Remove what a worker left behind that was killed at a job."""
+        _remove_parts(os.path.dirname(job.target), f".crayonize-{pid}-", None)
+
+
+def _remove_parts(folder: str, start: str, before: float | None) -> None:
+    with suppress(OSError), os.scandir(folder) as listing:
+        for entry in listing:
+            if entry.name.startswith(start) and entry.name.endswith(".part"):
+                with suppress(OSError):
+                    if before is None or entry.stat().st_mtime < before:
+                        os.unlink(entry.path)

@@ -1,0 +1,139 @@
+"""What is told of a batch: a line a file, a bar that moves, and at the end an account of every file.
+
+Lines for programs go to stdout as JSON, all else to stderr. Names may hold any bytes: in JSON those that are
+no UTF-8 stand as \\xff escapes, and the exact name follows in base64.
+"""
+
+import base64
+import contextlib
+import json
+import os
+import sys
+import time
+from collections import Counter
+from typing import Any
+
+from ..did_you_mean import printable
+from .job import STATUSES, Outcome
+
+_BAD = ("failed", "died", "timeout")
+_EVERY = 0.1  # s between two states of the bar
+_WIDTH = 20
+
+
+class Report:
+    """Counts every file once and tells what became of it."""
+
+    def __init__(self, as_json: bool, quiet: bool) -> None:
+        self._json, self._quiet = as_json, quiet
+        self.counts = Counter(dict.fromkeys(STATUSES, 0))
+        self._begun = time.monotonic()
+        self._bar = _Bar(shown=not quiet)
+
+    def expect(self, jobs: int) -> None:
+        """So many jobs are going to be done."""
+        self._bar.total += jobs
+
+    def file(self, name: str, outcome: Outcome, out: str | None = None) -> None:
+        """Tell of one file. OSError if stdout takes no more."""
+        self.counts[outcome.status] += 1
+        if self._json:
+            line: dict[str, Any] = _named("in", name) | (_named("out", out) if out else {}) | {"status": outcome.status}
+            if outcome.status == "ok":
+                line |= {"strokes": outcome.strokes, "bytes": outcome.bytes}
+            if outcome.seconds:
+                line["seconds"] = round(outcome.seconds, 3)
+            if outcome.error:
+                line["error"] = printable(outcome.error)
+            _print(json.dumps(line))
+        if outcome.status in _BAD:
+            self.say(f"{outcome.status}: {name}: {outcome.error}")
+
+    @property
+    def bad(self) -> int:
+        """How many files could not be drawn."""
+        return sum(self.counts[status] for status in _BAD)
+
+    def moved(self, failed: bool) -> None:
+        """Let the bar show that one more job is done."""
+        self._bar.step(failed)
+
+    def say(self, text: str, always: bool = True) -> None:
+        """A line for people; if not `always`, not with --quiet."""
+        if always or not self._quiet:
+            self._bar.clear()
+            with contextlib.suppress(OSError):
+                print(f"crayonize: {printable(' '.join(text.split()))}", file=sys.stderr, flush=True)
+
+    def end(self, code: int, reason: str = "", elsewhere: int = 0) -> None:
+        """The account of all files. reason: why the run was stopped, if it was."""
+        seconds = time.monotonic() - self._begun
+        if self._json:
+            line: dict[str, Any] = {"end": "stopped" if reason else "finished", "exit_code": code}
+            line |= {"reason": reason} if reason else {}
+            line |= {"total": self.counts.total(), "counts": dict(self.counts), "seconds": round(seconds, 3)}
+            _print(json.dumps(line | ({"in_other_shards": elsewhere} if elsewhere else {})))
+        told = [f"{n} {status.replace('_', ' ')}" for status, n in self.counts.items() if n]
+        shards = f"; {elsewhere} in other shards" if elsewhere else ""
+        if reason:
+            self.say(f"stopped: {reason}")
+        self.say(f"{', '.join(told) or 'no files'}{shards}; {_duration(seconds)}", always=False)
+
+
+def _named(key: str, name: str) -> dict[str, str]:
+    """A file's name for JSON."""
+    raw = os.fsencode(name)
+    try:
+        return {key: raw.decode("utf-8")}
+    except UnicodeDecodeError:
+        shown = raw.decode("utf-8", "backslashreplace")
+        return {key: shown, f"{key}_base64": base64.b64encode(raw).decode()}
+
+
+def _print(line: str) -> None:
+    print(line, flush=True)
+
+
+class _Bar:
+    """One line on a terminal: `[#####...............] 120 of 480 done, 2 failed, 360 left, 12 min left`."""
+
+    def __init__(self, shown: bool) -> None:
+        self.total = 0
+        self._shown = shown and sys.stderr is not None and sys.stderr.isatty()
+        self._begun = self._last = time.monotonic()
+        self._length = self._done = self._failed = 0
+
+    def step(self, failed: bool) -> None:
+        """One more is done."""
+        self._done += 1
+        self._failed += failed
+        now = time.monotonic()
+        if not self._shown or (now - self._last < _EVERY and self._done < self.total):
+            return
+        self._last = now
+        left = self.total - self._done
+        hashes = "#" * (self._done * _WIDTH // max(1, self.total))
+        text = f"[{hashes:.<{_WIDTH}}] {self._done} of {self.total} done, {self._failed} failed, {left} left"
+        if left:
+            text += f", {_duration((now - self._begun) / self._done * left)} left"
+        self._put(f"\r{text:<{self._length}}")
+        self._length = len(text)
+
+    def clear(self) -> None:
+        """Take the line away, so that something else may be written."""
+        if self._length:
+            self._put(f"\r{' ' * self._length}\r")
+            self._length = 0
+
+    def _put(self, text: str) -> None:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(text)
+            sys.stderr.flush()
+
+
+def _duration(seconds: float) -> str:
+    """Like `12 s`, `3 min` or `2 h 10 min`."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

@@ -1,0 +1,183 @@
+"""The Python interface: what goes in comes out, the same drawing by every way."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import crayonize
+from crayonize import api, memory
+from crayonize.image_read import read_linear
+from stroke_gen.drawing import Drawing, Stroke, Tip, load_drawing
+
+CHOICES = {"size": 120, "sheet_mm": 60.0, "seed": 3, "threads": 2}
+
+
+@pytest.fixture(scope="module")
+def photo():
+    y, x = np.mgrid[:40, :60].astype(np.float32)
+    return np.dstack([255 - 4 * y, 60 + 3 * x, 120 + 0 * x]).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def picture(photo):
+    return crayonize.convert(photo, **CHOICES)
+
+
+def test_array_gives_array(picture):
+    assert isinstance(picture, np.ndarray) and picture.dtype == np.uint8 and picture.shape == (80, 120, 3)
+
+
+def test_photo_is_not_changed(photo):
+    before = photo.copy()
+    crayonize.convert(photo, **CHOICES)
+    np.testing.assert_array_equal(photo, before)
+
+
+def test_picture_gives_the_same_picture(photo, picture):
+    made = crayonize.convert(Image.fromarray(photo), **CHOICES)
+    assert isinstance(made, Image.Image)
+    np.testing.assert_array_equal(np.asarray(made), picture)
+
+
+def test_path_gives_picture_or_path(photo, picture, tmp_path):
+    Image.fromarray(photo).save(tmp_path / "photo.png")
+    made = crayonize.convert(tmp_path / "photo.png", **CHOICES)
+    assert isinstance(made, Image.Image)
+    np.testing.assert_array_equal(np.asarray(made), picture)
+    out = crayonize.convert(str(tmp_path / "photo.png"), str(tmp_path / "out.png"), **CHOICES)
+    assert out == tmp_path / "out.png"
+    np.testing.assert_array_equal(np.asarray(Image.open(out)), picture)
+
+
+def test_array_can_be_written_too(photo, picture, tmp_path):
+    made = crayonize.convert(photo, tmp_path / "out.png", strokes=tmp_path / "strokes.json", **CHOICES)
+    np.testing.assert_array_equal(made, picture)
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "out.png")), picture)
+    drawing = load_drawing(tmp_path / "strokes.json")
+    for source in (drawing, tmp_path / "strokes.json", str(tmp_path / "strokes.json")):
+        np.testing.assert_array_equal(crayonize.draw(source, size=120), picture)
+
+
+def test_seed_and_light_and_palette_matter(photo, picture):
+    for other in ({"seed": 4}, {"light": False}, {"palette": "greys"}, {"paper": "black"}):
+        assert (crayonize.convert(photo, **CHOICES | other) != picture).any(), other
+
+
+def test_preview_is_half_the_size(photo):
+    assert crayonize.convert(photo, **CHOICES, preview=True).shape == (40, 60, 3)
+
+
+def test_progress_rises_to_the_end(photo):
+    told = []
+    crayonize.convert(photo, **CHOICES, progress=lambda name, done: told.append((name, done)))
+    shares = [done for _, done in told]
+    assert shares == sorted(shares) and 0 <= shares[0] and 0.5 < shares[-1] <= 1
+    assert all(isinstance(name, str) and name for name, _ in told)
+
+
+def test_progress_can_stop_the_work(photo, tmp_path):
+    class Enough(Exception):
+        pass
+
+    def stop(name, done):
+        raise Enough
+
+    with pytest.raises(Enough):
+        crayonize.convert(photo, tmp_path / "out.png", progress=stop, **CHOICES)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_draw_takes_a_drawing_made_by_hand(tmp_path):
+    line = Stroke(np.array([[5, 10], [25, 12]], np.float32), np.array([2, 3], np.float32), "red", Tip())
+    drawing = Drawing(30.0, 20.0, "smooth", "box8", (line,))
+    told = []
+    made = crayonize.draw(drawing, 90, out=tmp_path / "line.jpg", progress=lambda *step: told.append(step))
+    assert made.shape == (60, 90, 3) and told[-1][1] == 1
+    assert made[30:36, 30:60].astype(int).mean((0, 1)) @ [1, -1, 0] > 40  # red on the way
+    assert made[50:].min() > 200  # paper elsewhere
+    assert read_linear(tmp_path / "line.jpg").shape == made.shape
+
+
+@pytest.mark.parametrize("choices, error, words", [
+    ({"pallete": "box8"}, TypeError, 'did you mean "palette"'),
+    ({"palette": "box9"}, ValueError, "box8"),
+    ({"style": "x"}, ValueError, "style"),
+    ({"size": 0}, ValueError, "size: 0"),
+    ({"size": 100.0}, ValueError, "size: 100.0"),
+    ({"seed": True}, ValueError, "seed: True"),
+    ({"threads": 0}, ValueError, "threads: 0"),
+    ({"focus": [(0, 0, 1)]}, ValueError, "focus"),
+    ({"out": "/nowhere/out.png"}, ValueError, "nowhere"),
+    ({"strokes": "strokes.csv"}, ValueError, ".json"),
+], ids=str)  # fmt: skip
+def test_bad_choice_is_named(photo, choices, error, words):
+    with pytest.raises(error) as caught:
+        crayonize.convert(photo, **choices)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_draw_checks_too(tmp_path):
+    drawing = Drawing(30.0, 20.0, "smooth", "box8", ())
+    for options in ({"size": 0}, {"threads": -1}, {"out": tmp_path / "x.gif"}):
+        with pytest.raises(ValueError):
+            crayonize.draw(drawing, **options)
+    with pytest.raises(ValueError, match="cannot be read"):
+        crayonize.draw(tmp_path / "missing.json")
+
+
+def test_inputs_are_never_outputs(photo, tmp_path):
+    Image.fromarray(photo).save(tmp_path / "photo.png")
+    Image.fromarray(photo).save(tmp_path / "paper.png")
+    before = (tmp_path / "photo.png").read_bytes()
+    for name in ("photo.png", "paper.png"):
+        with pytest.raises(ValueError, match="over"):
+            crayonize.convert(tmp_path / "photo.png", tmp_path / name, paper=str(tmp_path / "paper.png"))
+    assert (tmp_path / "photo.png").read_bytes() == before
+
+
+def test_notes_hold_no_folder(photo, tmp_path):
+    (tmp_path / "mine.txt").write_text("#aa2211 brick\n#112233\n#ffeedd\n")
+    out = crayonize.convert(photo, tmp_path / "out.png", palette=str(tmp_path / "mine.txt"), **CHOICES)
+    assert str(tmp_path).encode() not in Path(tmp_path / "out.png").read_bytes()
+    assert isinstance(out, np.ndarray)
+
+
+# ---- memory ----------------------------------------------------------------------------------------------
+
+
+def test_memory_refuses_what_cannot_fit_and_names_a_size_that_does():
+    memory.check_fits(1000, 1000, available=None if memory.available_bytes() is None else 10**12)
+    with pytest.raises(ValueError, match=r"size: 20000 x 10000 cells need 17\.2 GB of memory, 4\.0 GB are free") as error:
+        memory.check_fits(10000, 20000, available=4 * 10**9)
+    fitting = int(str(error.value).split("a size of ")[1].split()[0])
+    memory.check_fits(fitting // 2, fitting, available=4 * 10**9)
+    with pytest.raises(ValueError):
+        memory.check_fits(round(fitting * 0.51), round(fitting * 1.02), available=4 * 10**9)
+
+
+def test_no_size_is_named_if_none_fits():
+    with pytest.raises(ValueError) as error:
+        memory.check_fits(100, 100, available=10**6)
+    assert "would fit" not in str(error.value)
+
+
+def test_memory_of_this_machine_is_plausible():
+    free = memory.available_bytes()
+    assert free is None or 10**7 < free < 10**14
+
+
+def test_limits_of_control_groups(tmp_path):
+    (tmp_path / "max").write_text("1000\n")
+    (tmp_path / "now").write_text("700\n")
+    (tmp_path / "stat").write_text("anon 5\ninactive_file 200\n")
+    files = [tmp_path / name for name in ("max", "now", "stat")]
+    assert list(memory._left(*files)) == [500]
+    (tmp_path / "max").write_text("max\n")
+    assert list(memory._left(*files)) == []
+    assert list(memory._left(tmp_path / "none", *files[1:])) == []
+
+
+def test_workshop_is_set_up_once():
+    assert api.workshop() is api.workshop()
