@@ -52,6 +52,11 @@ def blur(image: Floats, sigma: float) -> Floats:
     return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_REFLECT), np.float32)
 
 
+def far(linear: Floats) -> Floats:
+    """OKLab (h, w, 3) of a picture as the eye sees it from across the room."""
+    return oklab(blur(linear, 0.012 * max(linear.shape)))
+
+
 def read(linear: Floats, width_mm: float, height_mm: float, tip_mm: float, wrist_deg: float, wrist: float,
          focus: Sequence[tuple[float, float, float, float]]) -> Scene:  # fmt: skip
     """Analyse a photo in linear light for a sheet of the given size.

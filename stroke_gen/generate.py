@@ -15,6 +15,7 @@ from .recipes import Recipes
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
+FAR_SIGHT = 0.8  # how much a free coat makes up for colours that are off when seen from afar
 Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
 
 
@@ -58,6 +59,8 @@ def _coat(
     tip = Tip("sharp" if coat.sharp else "blunt", width)
     cells = width / scene.cell_mm
     aim = oklab(analysis.blur(scene.target, coat.soften * 0.5 * cells))
+    if coat.kind == "free":
+        aim = aim + FAR_SIGHT * (analysis.far(scene.target) - analysis.far(now))
     streaks = separation.streaks(*group.shape, cells, style.wrist_deg, rng)
     wants = separation.plates(analysis.blur(now, 0.5 * cells), aim, group, box, scene, plan, coat, cells, style.flat, streaks, threads)
     tangent = analysis.turned(scene.tangent, coat.angle)

@@ -19,7 +19,7 @@ TONE = 0.45  # weight of lightness when colours are grouped
 SAMPLES = 40  # colours by which a group is judged
 GRAIN_PRICE = 0.35  # OKLab units per unit of grain
 LAYER_PRICE = 0.008  # for the second crayon
-CLASH_PRICE = 0.03  # for two crayons of unlike hue, by their distance in a and b
+CLASH_PRICE = 0.12  # for two crayons of opposing hue (see `clash`): red over green is no brown for skin
 LIKE = 0.07  # OKLab distance within which groups are alike
 AGREEMENT = 0.04  # what sharing both crayons with all groups alike is worth
 RIVAL = 0.015  # a base this little dearer lies between the lines of the first ...
@@ -98,8 +98,8 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
     heavy = swatches.over(swatches.paper)[:, -1].sum(1)
     cost = np.empty((len(centres), len(pairs)), np.float32)
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
-    clash = np.linalg.norm(hues[pairs[:, 0]] - hues[pairs[:, 1]], axis=1)
-    extra = np.where(pairs[:, 0] != pairs[:, 1], LAYER_PRICE + CLASH_PRICE * clash, 0).astype(np.float32)
+    opposed = clash(hues[pairs[:, 0]], hues[pairs[:, 1]])
+    extra = np.where(pairs[:, 0] != pairs[:, 1], LAYER_PRICE + CLASH_PRICE * opposed, 0).astype(np.float32)
     _costs(sample, swatches.a, swatches.b, swatches.grain, swatches.paper, heavy, pairs, extra, TO_LMS, TO_LAB,
            np.float32(GRAIN_PRICE), cost)  # fmt: skip
     allowed = _box(cost, pairs, size / size.sum(), count, most)
@@ -107,6 +107,12 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
     best = _agree(cost, pairs, centres)
     base, shade = pairs[best].T
     return Recipes(centres, base, shade, _rivals(cost, pairs, base, shade, hues))
+
+
+def clash(one: Floats, other: Floats) -> Floats:
+    """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are alike."""
+    dot = (one * other).sum(-1)
+    return np.asarray(np.sqrt(np.maximum(np.hypot(one[..., 0], one[..., 1]) * np.hypot(other[..., 0], other[..., 1]) - dot, 0)))
 
 
 def _group(colours: Floats, groups: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:

@@ -15,7 +15,7 @@ from .analysis import Scene, blur
 from .colour import TO_LAB, TO_LMS, cube_root, oklab
 from .jit import kernel
 from .params import Pass
-from .recipes import GRAIN_PRICE, TONE, Recipes, nearest
+from .recipes import CLASH_PRICE, GRAIN_PRICE, TONE, Recipes, clash, nearest
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
@@ -195,9 +195,11 @@ def _worthiest(
     small = cv2.resize(current, half, interpolation=cv2.INTER_AREA), cv2.resize(aim, half, interpolation=cv2.INTER_AREA)
     gain, _ = gains(*small, swatches, need, coat, threads)
     worth = np.full(gain.shape, -9, np.float32)
+    hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
     for k in used:
         home = (recipes.base[group] == k) | (recipes.shade[group] == k)
         worth[k] = blur(gain[k], 0.5 * coat.cohere * cells) - np.where(home, 0, STRANGER_PRICE)
+        worth[k] -= CLASH_PRICE * clash(hues[k], small[1][..., 1:])
     return cv2.resize(worth.argmax(0).astype(np.int16), (w, h), interpolation=cv2.INTER_NEAREST).astype(np.int64)
 
 

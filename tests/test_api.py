@@ -60,8 +60,8 @@ def test_array_can_be_written_too(photo, picture, tmp_path):
         np.testing.assert_array_equal(crayonize.draw(source, size=120), picture)
 
 
-def test_seed_and_light_and_palette_matter(photo, picture):
-    for other in ({"seed": 4}, {"light": False}, {"palette": "greys"}, {"paper": "black"}):
+def test_seed_light_and_force_matter(photo, picture):
+    for other in ({"seed": 4}, {"light": False}, {"force": "heavy"}):
         assert (crayonize.convert(photo, **CHOICES | other) != picture).any(), other
 
 

@@ -135,7 +135,7 @@ def check_outputs(
     if out is not None:
         file_format(out)
     if strokes is not None and Path(strokes).suffix.lower() not in STROKE_SUFFIXES:
-        raise ValueError(f"{os.fspath(strokes)}: strokes can be saved as {', '.join(STROKE_SUFFIXES)} only")
+        raise ValueError(f"{strokes}: strokes can be saved as {', '.join(STROKE_SUFFIXES)} only")
     taken = [path for path in inputs if isinstance(path, str | os.PathLike)]
     for output in (out, strokes):
         if output is None:
@@ -143,9 +143,11 @@ def check_outputs(
         for path in taken:
             if same_file(path, output):
                 raise ValueError(f"{output}: would be written over {path}; give another name")
+        if Path(output).is_dir():
+            raise ValueError(f"{output}: is a folder; give the name of a file")
         folder = Path(output).parent
         if not folder.is_dir():
-            raise ValueError(f"{os.fspath(output)}: the folder {folder} does not exist; create it first")
+            raise ValueError(f"{output}: the folder {folder} does not exist; create it first")
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(13, "its folder may not be written to", os.fspath(output))
         taken.append(output)
@@ -246,13 +248,13 @@ def workshop() -> ModuleType:
 
 
 def warm_up() -> None:
-    """Draw a tiny picture through every kernel, so that all are compiled and kept."""
+    """Draw a narrow strip in every style, and so through every kernel, that all are compiled and kept."""
     import numpy as np
 
     from stroke_gen.params import style_names
 
-    y, x = np.mgrid[:48, :64] / np.float32(48)
-    photo = np.stack([x * 0.75, y, 0.5 + 0.5 * np.sin(9 * x * y)], axis=-1)
+    y, x = np.mgrid[:8, :64] / np.float32(8)
+    strip = np.stack([x / 8, y, 0.5 + 0.5 * np.sin(2 * x * y)], axis=-1)
     for style in style_names():
-        convert(photo, style=style, size=240, sheet_mm=60.0)
-    convert(photo, size=240, sheet_mm=60.0, preview=True, light=False)
+        convert(strip, style=style, size=400, sheet_mm=100.0)
+    convert(strip, size=400, sheet_mm=100.0, preview=True, light=False)

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 from conftest import Desk, check_whole, needs, photo, tree
+from PIL import Image
+
+from crayonize.batch import memory
 
 ROOT = os.name == "posix" and os.geteuid() == 0
 PHOTOS = 40
@@ -49,7 +52,7 @@ def test_after_a_killed_parent_the_next_run_does_the_rest(desk: Desk, dice: rand
 @pytest.mark.parametrize("chance", range(10))
 def test_a_signal_ends_the_run_soon(desk: Desk, dice: random.Random, chance: int) -> None:
     number = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[chance % 3]
-    run = desk.fill(PHOTOS, 0.1 if chance < 7 else 30).start()
+    run = desk.fill(PHOTOS, 0.06 if chance < 7 else 30).start()
     run.wait_until(run.begun() if chance < 7 else lambda: len(run.workers()) == 2)
     time.sleep(dice.random() * 0.2)
     begun = time.monotonic()
@@ -60,7 +63,8 @@ def test_a_signal_ends_the_run_soon(desk: Desk, dice: random.Random, chance: int
     assert run.end() == 128 + number
     assert time.monotonic() - begun < 2
     assert run.lines[-1]["end"] == "stopped" and run.count("not_run") > 0
-    assert run.count("ok") == len(list(desk.pictures.rglob("*.png")))
+    made = len(list(desk.pictures.rglob("*.png")))
+    assert made - 2 <= run.count("ok") <= made  # a worker may be stopped between its picture and its word
     assert not list(desk.pictures.rglob("*.part"))
     if chance == 0:
         desk.finish(PHOTOS)
@@ -106,11 +110,11 @@ def test_a_crash_costs_one_picture(desk: Desk, name: str) -> None:
     assert run.process.returncode == (0 if verdict == "ok" else 3)
 
 
-@pytest.mark.parametrize("limit", [300 << 20, 600 << 20])
+@pytest.mark.parametrize("limit", [600 << 20, 900 << 20])
 def test_a_picture_that_eats_memory_costs_one_picture(desk: Desk, limit: int) -> None:
     desk.fill(6)
     photo(desk.photos / "eat.png")
-    run = desk.run("--memory", str((1 << 30) + limit))
+    run = desk.run("--memory", str(limit))
     assert run.process.returncode == 3
     assert run.status("eat.png") == "failed" and run.count("ok") == 6
 
@@ -137,8 +141,8 @@ def _join(group: Path) -> None:
 
 def test_a_photo_larger_than_the_memory_is_refused_before_it_is_opened(desk: Desk) -> None:
     desk.fill(2)
-    photo(desk.photos / "large.png", size=(6000, 5000))
-    run = desk.run("--memory", str(570_000_000))
+    Image.new("L", (6000, 5000)).save(desk.photos / "large.png")
+    run = desk.run("--memory", str(memory.need("PNG", 29_000_000, 64)))
     assert run.status("large.png") == "failed" and "memory" in run.said
     assert run.count("ok") == 2
 
@@ -201,11 +205,7 @@ def test_a_folder_closed_to_us_stops_the_run(desk: Desk, where: str) -> None:
 @needs(Path("/dev/full").exists(), "/dev/full")
 def test_a_report_that_cannot_be_written_stops_the_run(desk: Desk) -> None:
     with open("/dev/full", "wb") as full:
-        run = desk.start(stdout=full)
-        desk.fill(4)
-        assert run.end() in (0, 1)
-    with open("/dev/full", "wb") as full:
-        run = desk.start("--existing", "overwrite", stdout=full)
+        run = desk.fill(4).start(stdout=full)
         assert run.end() == 1
     assert "No space left" in run.said and "Traceback" not in run.said
 

@@ -44,6 +44,8 @@ class Studio:
             return Outcome("failed", "there is not enough memory for it; choose a smaller --size or fewer --jobs")
         except OutputError:
             raise
+        except OSError as error:
+            return Outcome("failed", f"cannot be read ({error.strerror or error})")
         except Exception as error:  # one photo is never worth the others
             return Outcome("failed", f"this should not have happened ({type(error).__name__}: {error})")
 

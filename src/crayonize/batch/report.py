@@ -6,6 +6,7 @@ no UTF-8 stand as \\xff escapes, and the exact name follows in base64.
 
 import base64
 import contextlib
+import errno
 import json
 import os
 import sys
@@ -62,8 +63,7 @@ class Report:
         """A line for people; if not `always`, not with --quiet."""
         if always or not self._quiet:
             self._bar.clear()
-            with contextlib.suppress(OSError):
-                print(f"crayonize: {printable(' '.join(text.split()))}", file=sys.stderr, flush=True)
+            _tell(f"crayonize: {printable(' '.join(text.split()))}\n")
 
     def end(self, code: int, reason: str = "", elsewhere: int = 0) -> None:
         """The account of all files. reason: why the run was stopped, if it was."""
@@ -91,7 +91,18 @@ def _named(key: str, name: str) -> dict[str, str]:
 
 
 def _print(line: str) -> None:
+    """A line for programs; OSError if it cannot be written."""
+    if sys.stdout is None:
+        raise OSError(errno.EBADF, "stdout is closed")
     print(line, flush=True)
+
+
+def _tell(text: str) -> None:
+    """Text for people; nothing is lost if it cannot be written."""
+    if sys.stderr is not None:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(text)
+            sys.stderr.flush()
 
 
 class _Bar:
@@ -116,19 +127,14 @@ class _Bar:
         text = f"[{hashes:.<{_WIDTH}}] {self._done} of {self.total} done, {self._failed} failed, {left} left"
         if left:
             text += f", {_duration((now - self._begun) / self._done * left)} left"
-        self._put(f"\r{text:<{self._length}}")
+        _tell(f"\r{text:<{self._length}}")
         self._length = len(text)
 
     def clear(self) -> None:
         """Take the line away, so that something else may be written."""
         if self._length:
-            self._put(f"\r{' ' * self._length}\r")
+            _tell(f"\r{' ' * self._length}\r")
             self._length = 0
-
-    def _put(self, text: str) -> None:
-        with contextlib.suppress(OSError):
-            sys.stderr.write(text)
-            sys.stderr.flush()
 
 
 def _duration(seconds: float) -> str:

@@ -122,10 +122,14 @@ def _draw(plan: Plan, folder: OutputFolder, options: Options, recipe: Recipe, re
         code, reason = 1, str(error)
     finally:
         crew.close()
-    for job in left:
-        report.file(job.photo.name, Outcome("not_run"), job.out)
-    code = code or (3 if report.bad else 0)
-    report.end(code, reason, plan.elsewhere)
+    try:
+        for job in left:
+            report.file(job.photo.name, Outcome("not_run"), job.out)
+        code = code or (3 if report.bad else 0)
+        report.end(code, reason, plan.elsewhere)
+    except OSError as error:
+        report.say(f"stopped: the report cannot be written ({error.strerror})")
+        code = code or 1
     return code
 
 
