@@ -150,6 +150,7 @@ def tone_map(scene: Scene, swatches: Swatches, style: Style) -> Scene:
     low, high = np.percentile(lab[..., 0], (0.5, 99.5))
     low, high = min(float(low), darkest + 0.02), max(float(high), lightest)
     lab[..., 0] = darkest + (np.clip(lab[..., 0], low, high) - low) / max(high - low, 1e-6) * (lightest - darkest)
+    lab[..., 0] += 4 * style.lift * lab[..., 0] * (1 - lab[..., 0])
     chroma = np.hypot(lab[..., 1], lab[..., 2])
     warm = np.clip((lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1)
     shy = np.exp(-((chroma / 0.18) ** 2)) * np.clip(chroma / 0.05, 0, 1)

@@ -30,6 +30,7 @@ class Pass:
     angle: float = 0.0  # -90..90 degrees against the field, so that coats cross
     cohere: float = 1.0  # 0..6 tips over which neighbours agree on a crayon
     edge: float = 0.4  # 0.1..2 tips: how much of the tip must gain for a line to go on; small keeps borders crisp
+    hardest: float = 2.0  # 0.03..2 N/mm^2: no line is pressed harder, so that what lies below stays to be seen
     gain: float = 0.02  # 0..1 least gain in colour (OKLab) for which the hand moves
     detail: float = 0.0  # 0..1 only where the photo has at least this much detail
     tone: float = 1.0  # 0..4 weight of lightness against colour: small in a first coat that seeks the hue
@@ -48,6 +49,7 @@ class Style:
     crayons: int = 16  # 1..64 most crayons taken out of the box
     recipes: int = 30  # 1..100 kinds of colour told apart
     chroma: float = 1.0  # 0..3 colourfulness asked for
+    lift: float = 0.0  # 0..0.3 middle tones drawn lighter than they are, as paper is lighter than a photo
     skin: float = 0.45  # 0..3 more colour for pale warm tones, so that skin stays skin
     wrist_deg: float = -50.0  # -90..90 the hand's own direction; -50 runs from lower left to upper right
     wrist: float = 0.3  # 0..100 how much the wrist counts against the form
@@ -68,9 +70,9 @@ class Style:
 
 _RANGES = {
     "tip": (0.2, 4), "spacing": (0.3, 2), "shortest": (0.3, 20), "reach": (1, 60), "legs": (1, 60), "angle": (-90, 90),
-    "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "detail": (0, 1), "dark_price": (0, 4), "tone": (0, 4),
+    "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "hardest": (0.03, 2), "detail": (0, 1), "dark_price": (0, 4), "tone": (0, 4),
     "soften": (0, 4), "gap": (0, 4), "single": (0, 1),
-    "tip_mm": (0.5, 30), "crayons": (1, 64), "recipes": (1, 100), "chroma": (0, 3), "skin": (0, 3), "wrist_deg": (-90, 90), "wrist": (0, 100),
+    "tip_mm": (0.5, 30), "crayons": (1, 64), "recipes": (1, 100), "chroma": (0, 3), "skin": (0, 3), "lift": (0, 0.3), "wrist_deg": (-90, 90), "wrist": (0, 100),
     "press": (0.1, 5), "force_spread": (0, 1), "swell": (0, 1), "wobble": (0, 1), "overshoot": (0, 3), "lines": (0, 5), "flat": (0, 1), "fan_deg": (0, 90),
     "line_tip": (0.2, 3), "line_press": (0.1, 5),
 }  # fmt: skip

@@ -29,9 +29,9 @@ _cube_root = kernel(cube_root)
 
 
 @kernel
-def _gain(top, bottom, current, lab, need, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best):  # type: ignore[no-untyped-def]
+def _gain(top, bottom, current, lab, need, pressures, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best):  # type: ignore[no-untyped-def]
     """Best gain and pressure index of the needed crayons on rows top..bottom: gain, best (k, h, w)."""
-    crayons, pressures = grain.shape
+    crayons = grain.shape[0]
     for y in range(top, bottom):
         for x in range(current.shape[1]):
             r, g, b0 = current[y, x, 0], current[y, x, 1], current[y, x, 2]
@@ -72,11 +72,12 @@ def gains(
     for each crayon in question. A crayon that is not has the gain UNASKED.
     """
     h, w = current.shape[:2]
+    pressures = max(1, int((swatches.pressures <= coat.hardest).sum()))
     gain = np.full((len(swatches.names), h, w), UNASKED, np.float32)
     best = np.zeros(gain.shape, np.int8)
 
     def band(top: int) -> None:
-        _gain(top, min(h, top + BAND), current, lab, need, swatches.a, swatches.b, swatches.grain, TO_LMS, TO_LAB,
+        _gain(top, min(h, top + BAND), current, lab, need, pressures, swatches.a, swatches.b, swatches.grain, TO_LMS, TO_LAB,
               np.float32(coat.tone), np.float32(coat.dark_price), np.float32(GRAIN_PRICE), gain, best)  # fmt: skip
 
     with ThreadPoolExecutor(threads) as pool:
