@@ -126,16 +126,28 @@ def faces(target: Floats) -> list[tuple[float, float, float, float]]:
 
     h, w = target.shape[:2]
     scale = min(1.0, FACE_SIDE / max(h, w))
-    small = (np.clip(fit(target, (max(1, round(h * scale)), max(1, round(w * scale)))), 0, 1) ** (1 / 2.2) * 255).astype(np.uint8)
+    small = (
+        np.clip(fit(target, (max(1, round(h * scale)), max(1, round(w * scale)))), 0, 1) ** (1 / 2.2) * 255
+    ).astype(np.uint8)
     if min(small.shape[:2]) < 40:
         return []
-    detector = feature.Cascade(data.lbp_frontal_face_cascade_filename())
+    detector = feature.Cascade(data.lbp_frontal_face_cascade_filename())  # type: ignore[no-untyped-call]
     side = min(small.shape[:2])
-    found = detector.detect_multi_scale(img=small, scale_factor=1.2, step_ratio=1, min_size=(side // 8, side // 8), max_size=(side, side), min_neighbor_number=5)
-    return [(f["c"] / small.shape[1], f["r"] / small.shape[0], f["width"] / small.shape[1], f["height"] / small.shape[0]) for f in found]
+    found = detector.detect_multi_scale(
+        img=small,
+        scale_factor=1.2,
+        step_ratio=1,
+        min_size=(side // 8, side // 8),
+        max_size=(side, side),
+        min_neighbor_number=5,
+    )
+    return [
+        (f["c"] / small.shape[1], f["r"] / small.shape[0], f["width"] / small.shape[1], f["height"] / small.shape[0])
+        for f in found
+    ]
 
 
-def turned(tangent: Floats, degrees: "float | Floats") -> Floats:
+def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:
     """A field of directions turned by an angle, one for all or one for each place (h, w)."""
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     x, y = tangent[..., 0], tangent[..., 1]

@@ -15,6 +15,7 @@ from .analysis import Scene, blur
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .params import Style
+from .separation import Plan
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
@@ -33,13 +34,9 @@ class Line:
     worth: float
 
 
-def outlines(
-    scene: Scene, group: NDArray[np.int64], now: Floats, box: Swatches, style: Style, rng: np.random.Generator
-) -> list[Stroke]:
-    """Outline strokes for a scene whose sheet shows `now` (h, w, 3), light crayons first.
-
-    group (h, w): the recipe of each place, whose areas closed outlines go round.
-    """
+def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
+    """Outline strokes for a plan whose sheet shows `now` (h, w, 3), light crayons first."""
+    scene, box = plan.scene, plan.swatches.only(plan.recipes.crayons())
     if style.lines <= 0:
         return []
     tip = Tip("sharp", style.line_tip * style.tip_mm)
@@ -48,7 +45,9 @@ def outlines(
     picked = []
     candidates = _lines(scene, width)
     if style.closed:  # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
-        candidates = _areas(scene, group, width) + [c for c in candidates if _sample(scene.detail, c.path).mean() > 0.45]
+        candidates = _areas(scene, plan.group, width) + [
+            c for c in candidates if _sample(scene.detail, c.path).mean() > 0.45
+        ]
     for line in sorted(candidates, key=lambda line: -line.worth):
         budget -= len(line.path)
         if budget < 0:
@@ -70,18 +69,20 @@ def _lines(scene: Scene, width: float) -> list[Line]:
     """Candidate lines of the scene for a tip `width` cells wide."""
     lightness = blur(scene.lab[..., 0], max(0.3 * width, 0.7))
     h, w = lightness.shape
-    grey = cv2.resize(np.clip(lightness * 255, 0, 255).astype(np.uint8), (w * SCALE, h * SCALE), interpolation=cv2.INTER_CUBIC)
+    grey = cv2.resize(
+        np.clip(lightness * 255, 0, 255).astype(np.uint8), (w * SCALE, h * SCALE), interpolation=cv2.INTER_CUBIC
+    )
     detector = cv2.ximgproc.createEdgeDrawing()
-    settings = cv2.ximgproc_EdgeDrawing_Params()
+    settings = cv2.ximgproc_EdgeDrawing_Params()  # type: ignore[attr-defined]
     settings.GradientThresholdValue, settings.AnchorThresholdValue = 14, 4
     settings.MinPathLength = max(8, int(3 * width * SCALE))
     detector.setParams(settings)
     detector.detectEdges(grey)
     lines = []
     for chain in detector.getSegments():
-        path = (np.asarray(chain, np.float32) + 0.5) / SCALE
+        path = (np.asarray(chain, np.float32) + np.float32(0.5)) / np.float32(SCALE)
         for part in np.array_split(path, max(1, int(len(path) / SCALE / (LONGEST * width)))):
-            line = _line(_fair(part, 1.5 * SCALE), scene, lightness, width)
+            line = _line(_fair(np.asarray(part, np.float32), 1.5 * SCALE), scene, lightness, width)
             if line is not None:
                 lines.append(line)
     return lines
@@ -121,7 +122,7 @@ def _fair(path: Floats, sigma: float) -> Floats:
     weights = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
     weights /= weights.sum()
     smooth = np.stack([np.convolve(padded[:, c], weights, "valid") for c in (0, 1)], 1)
-    return smooth[:: SCALE].astype(np.float32)
+    return smooth[::SCALE].astype(np.float32)
 
 
 def _line(path: Floats, scene: Scene, lightness: Floats, width: float, factor: float = 1.0) -> Line | None:
@@ -151,7 +152,7 @@ def _sample(image: Floats, path: Floats) -> Floats:
 
 
 def _crayon(line: Line, scene: Scene, now: Floats, box: Swatches, style: Style) -> tuple[float, str, float]:
-    """Lightness, name and pressure of the crayon that comes nearest to the line's darker side, a little darker still."""
+    """Lightness, name and pressure of the crayon that comes nearest to the line's darker side, or darker."""
     width = style.line_tip * style.tip_mm / scene.cell_mm
     sides = [_sample(scene.lab, line.path + side * _normal(line.path) * 0.6 * width).mean(0) for side in (1, -1)]
     aim = min(sides, key=lambda lab: float(lab[0])) - np.array([0.15 if style.closed else 0.05, 0, 0], np.float32)

@@ -149,9 +149,7 @@ def _parsed(text: str, where: str) -> Any:
     try:
         return json.loads(text, object_pairs_hook=_compacted)
     except json.JSONDecodeError as error:
-        raise ValueError(
-            f"{where}: line {error.lineno}, column {error.colno}: not JSON ({error.msg})"
-        ) from error
+        raise ValueError(f"{where}: line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from error
     except RecursionError as error:
         raise ValueError(f"{where}: nested too deeply to be a drawing") from error
     except _RepeatedKey as error:
@@ -188,12 +186,8 @@ def drawing_from_json(obj: Any, where: str = "drawing") -> Drawing:
     if obj["format"] != FORMAT:
         raise ValueError(f'{where}: format: {_shown(obj["format"])} is not "{FORMAT}"')
     if obj["version"] != VERSION or isinstance(obj["version"], bool):
-        raise ValueError(
-            f"{where}: version: {_shown(obj['version'])} is not {VERSION}, the one this program reads"
-        )
-    given = _as(
-        list, obj["strokes"], f"{where}: strokes", 'a list like [{"crayon": "red", "path": [[1, 2]]}]'
-    )
+        raise ValueError(f"{where}: version: {_shown(obj['version'])} is not {VERSION}, the one this program reads")
+    given = _as(list, obj["strokes"], f"{where}: strokes", 'a list like [{"crayon": "red", "path": [[1, 2]]}]')
     _check_count("strokes", len(given), MAX_STROKES, where)
     tip = _tip(obj.get("tip", {}), Tip(), f"{where}: tip")
     force = _number(obj.get("force", DEFAULT_FORCE_N), 0.0, MAX_FORCE_N, "N", f"{where}: force")
@@ -265,9 +259,7 @@ def _forces(value: Any, count: int, where: str) -> NDArray[np.float64]:
     if not isinstance(value, list):
         return np.full(count, _number(value, 0.0, MAX_FORCE_N, "N", where))
     if len(value) != count:
-        raise ValueError(
-            f"{where}: {len(value)} numbers for {count} points, give one number or one for each point"
-        )
+        raise ValueError(f"{where}: {len(value)} numbers for {count} points, give one number or one for each point")
     forces = _float64(value)
     if forces is None:
         bad = next(v for v in value if not _is_number(v))
@@ -436,9 +428,7 @@ def _check_stroke(stroke: Stroke, width_mm: float, height_mm: float, where: str)
     _check_tip(stroke.tip, f"{where}: tip")
     path, force = stroke.path_mm, stroke.force_n
     if path.ndim != 2 or path.shape[1] != 2 or len(path) == 0 or force.shape != (len(path),):
-        raise ValueError(
-            f"{where}: path {path.shape} and force {force.shape} are not of shapes (n, 2) and (n,)"
-        )
+        raise ValueError(f"{where}: path {path.shape} and force {force.shape} are not of shapes (n, 2) and (n,)")
     for axis, size in enumerate((width_mm, height_mm)):
         _check_range(path[:, axis], -size, 2 * size, 0.002, f"{where}: path", f"{'xy'[axis]} =", "mm")
     _check_range(force, 0.0, MAX_FORCE_N, 0.0, f"{where}: force", "force =", "N")

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import analysis, contours, hand, hatching, recipes, separation
-from .analysis import Scene
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .params import Pass, Style
-from .recipes import Recipes
+from .separation import Plan
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
+AGREE = 0.45  # tips over which neighbours agree on a recipe
 FAR_SIGHT = 0.8  # how much a free coat makes up for colours that are off when seen from afar
 Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
 
@@ -31,40 +31,38 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     scene = analysis.read(photo, width_mm, height_mm, style.tip_mm, style.wrist_deg, style.wrist, focus)
     scene = analysis.tone_map(scene, swatches, style)
-    plan = recipes.find(scene.lab, swatches, style.recipes, style.crayons, rng)
-    group = separation.grouped(scene.lab, plan, 0.45 * style.tip_mm / scene.cell_mm)
-    fan = style.fan_deg * rng.standard_normal(len(plan.base))[group] if style.fan_deg else 0.0
-    scene = replace(scene, tangent=analysis.turned(scene.tangent, fan))
-    box = swatches.only(plan.crayons())
-    shape = scene.detail.shape
+    mixes = recipes.find(scene.lab, swatches, style.recipes, style.crayons, rng)
+    group = separation.grouped(scene.lab, mixes, AGREE * style.tip_mm / scene.cell_mm)
+    fan = style.fan_deg * rng.standard_normal(len(mixes.base)).astype(np.float32)
+    scene = replace(scene, tangent=analysis.turned(scene.tangent, fan[group]))
+    plan = Plan(scene, swatches, mixes, group, threads)
+    stages = [lambda now, coat=coat: _coat(plan, now, coat, style, rng) for coat in style.passes]
+    lines = [lambda now: contours.outlines(plan, now, style, rng)]
     strokes: list[Stroke] = []
-    now = observe([], shape)
-    if style.lines_first:
-        strokes = contours.outlines(scene, group, now, box, style, rng)
-        now = observe(strokes, shape)
-    for coat in style.passes:
-        fresh = _coat(scene, group, now, swatches, plan, coat, style, rng, threads)
+    now = observe([], group.shape)
+    for stage in lines * style.lines_first + stages + lines:
+        fresh = stage(now)
         strokes += fresh
-        now = observe(fresh, shape)
-    fresh = contours.outlines(scene, group, now, box, style, rng)
-    observe(fresh, shape)
-    return strokes + fresh
+        now = observe(fresh, group.shape)
+    return strokes
 
 
-def _coat(
-    scene: Scene, group: NDArray[np.int64], now: Floats, box: Swatches, plan: Recipes, coat: Pass, style: Style, rng: np.random.Generator, threads: int
-) -> list[Stroke]:  # fmt: skip
+def _coat(plan: Plan, now: Floats, coat: Pass, style: Style, rng: np.random.Generator) -> list[Stroke]:
     """One coat: choose a crayon for every place, then hatch crayon by crayon, light to dark."""
+    scene, box = plan.scene, plan.swatches
     width = coat.tip * style.tip_mm
     tip = Tip("sharp" if coat.sharp else "blunt", width)
     cells = width / scene.cell_mm
     aim = oklab(analysis.blur(scene.target, coat.soften * 0.5 * cells))
     if coat.kind == "free":
-        aim = aim + FAR_SIGHT * (analysis.far(scene.target) - analysis.far(now))
-    streaks = separation.streaks(*group.shape, cells, style.wrist_deg, rng)
-    wants = separation.plates(analysis.blur(now, 0.5 * cells), aim, group, box, scene, plan, coat, cells, style.flat, streaks, threads)
-    tangent = analysis.turned(scene.tangent, coat.angle)
-    how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single)
+        aim = aim + np.float32(FAR_SIGHT) * (analysis.far(scene.target) - analysis.far(now))
+    h, w = plan.group.shape
+    streak = separation.streaks(h, w, cells, style.wrist_deg, rng)
+    wants = separation.plates(plan, analysis.blur(now, 0.5 * cells), aim, coat, cells, style.flat, streak)
+    tangent = analysis.turned(scene.tangent, np.float32(coat.angle))
+    how = hatching.Hatch(
+        coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single
+    )
     strokes: list[Stroke] = []
     for k in sorted(wants, key=lambda k: -box.lightness()[k]):
         paths = hatching.hatch(wants[k], tangent, scene.coherence, how, rng)

@@ -28,7 +28,9 @@ class Paths:
     first: NDArray[np.int64]  # (paths + 1,)
 
 
-def draw(paths: Paths, scale_mm: float, crayon: str, tip: Tip, note: str, style: Style, rng: np.random.Generator) -> list[Stroke]:
+def draw(
+    paths: Paths, scale_mm: float, crayon: str, tip: Tip, note: str, style: Style, rng: np.random.Generator
+) -> list[Stroke]:
     """Strokes along paths given in units of `scale_mm`."""
     if len(paths.first) < 2:
         return []
@@ -37,14 +39,17 @@ def draw(paths: Paths, scale_mm: float, crayon: str, tip: Tip, note: str, style:
     path = paths.points.astype(np.float64) * scale_mm
     _overshoot(path, first, last, style.overshoot * tip.width_mm, rng)
     along, length = _lengths(path, first, last, owner)
-    path += _sideways(path, first, last) * (style.wobble * tip.width_mm * _slow(along / (4 * tip.width_mm), owner, rng))[:, None]
+    path += (
+        _sideways(path, first, last)
+        * (style.wobble * tip.width_mm * _slow(along / (4 * tip.width_mm), owner, rng))[:, None]
+    )
     force = paths.pressure * (1 + style.swell * _slow(along / (5 * tip.width_mm), owner, rng))
     force *= _legs(paths.leg, first, style.force_spread, rng) * (1 - TURN_DIP * _turns(paths.leg, first, last))
     ends = np.minimum(along, length[owner] - along) / (TAPER * tip.width_mm)
     force *= np.clip(0.55 + 0.45 * ends, 0, 1)
     newton = np.clip(force * 0.785 * tip.width_mm**2 * style.press, 0.02, 60)
-    path, newton = np.round(path, 3).astype(np.float32), np.round(newton, 3).astype(np.float32)
-    return [Stroke(path[a : b + 1], newton[a : b + 1], crayon, tip, note) for a, b in zip(first, last, strict=True)]
+    xy, force_n = np.round(path, 3).astype(np.float32), np.round(newton, 3).astype(np.float32)
+    return [Stroke(xy[a : b + 1], force_n[a : b + 1], crayon, tip, note) for a, b in zip(first, last, strict=True)]
 
 
 def _overshoot(

@@ -103,10 +103,16 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
         start = used
         for leg in range(most):
             if leg == 0:  # through the seed both ways
-                n = _leg(x, y, tx, ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, forth)
-                m = _leg(x, y, -tx, -ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, back)
+                n = _leg(
+                    x, y, tx, ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, forth
+                )
+                m = _leg(
+                    x, y, -tx, -ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, back
+                )
             else:  # one spacing beside the last end: a little further on, then back
-                n = _leg(x, y, tx, ty, want, tangent, stamp, fine, step, spacing * np.float32(1.5), gap, sharpest, forth)
+                n = _leg(
+                    x, y, tx, ty, want, tangent, stamp, fine, step, spacing * np.float32(1.5), gap, sharpest, forth
+                )
                 ragged = own_reach * (np.float32(0.85) + np.float32(0.3) * luck[dice % luck.size])
                 dice += 1
                 m = _leg(x, y, -tx, -ty, want, tangent, stamp, fine, step, ragged, gap, sharpest, back)
@@ -177,7 +183,7 @@ def _seeds(want: Floats, how: Hatch, rng: np.random.Generator) -> Floats:
     """Places to begin, one to a spacing, region by region as a hand moves over the sheet."""
     h, w = want.shape
     pitch = max(how.spacing * 0.7, 1.0)
-    y, x = np.mgrid[0 : h : pitch, 0 : w : pitch].reshape(2, -1)
+    y, x = np.mgrid[0:h:pitch, 0:w:pitch].reshape(2, -1)
     jitter = rng.random((2, x.size)) * pitch
     x, y = np.minimum(x + jitter[0], w - 1e-3), np.minimum(y + jitter[1], h - 1e-3)
     wanted = want[y.astype(int), x.astype(int)] > 0

@@ -7,23 +7,21 @@ module is imported, by the environment variable NUMBA_CACHE_DIR; CRAYONIZE_NO_CA
 
 import os
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
-
-F = TypeVar("F", bound=Callable[..., Any])
-
 
 CACHE = not os.environ.get("CRAYONIZE_NO_CACHE")
 
 
-def kernel(function: F) -> F:
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` at its first call; threads may run it side by side."""
-    compiled: F = numba.njit(cache=CACHE, nogil=True, error_model="numpy")(function)
+    compiled: Callable[..., Any] = numba.njit(cache=CACHE, nogil=True, error_model="numpy")(function)
     return compiled
 
 
-def sum_kernel(function: F) -> F:
+def sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """As `kernel`, for plain sums: the order of additions is the compiler's, so that it can use vectors."""
-    compiled: F = numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})(function)
+    relaxed = {"reassoc", "nsz"}
+    compiled: Callable[..., Any] = numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=relaxed)(function)
     return compiled

@@ -10,7 +10,7 @@ import os
 import tomllib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_type_hints
 
 _FOLDER = Path(__file__).with_name("styles")
 
@@ -21,23 +21,23 @@ class Pass:
 
     name: str = "coat"
     kind: str = "free"  # base or shade: by the recipe; free: whatever helps most after a look at the sheet
-    tip: float = 1.0  # 0.2..4: width of the tip, in usual tips
+    tip: Annotated[float, 0.2, 4] = 1.0  # width of the tip, in usual tips
     sharp: bool = False  # a sharpened tip
-    spacing: float = 0.62  # 0.3..2 tips between lines; below 0.5 the hatch closes
-    shortest: float = 2.5  # 0.3..20 tips: shorter lines are left out
-    reach: float = 14.0  # 1..60 tips: the longest line without moving the arm
-    legs: int = 10  # 1..60 lines in one zigzag
-    angle: float = 0.0  # -90..90 degrees against the field, so that coats cross
-    cohere: float = 1.0  # 0..6 tips over which neighbours agree on a crayon
-    edge: float = 0.4  # 0.1..2 tips: how much of the tip must gain for a line to go on; small keeps borders crisp
-    hardest: float = 2.0  # 0.03..2 N/mm^2: no line is pressed harder, so that what lies below stays to be seen
-    gain: float = 0.02  # 0..1 least gain in colour (OKLab) for which the hand moves
-    detail: float = 0.0  # 0..1 only where the photo has at least this much detail
-    tone: float = 1.0  # 0..4 weight of lightness against colour: small in a first coat that seeks the hue
-    dark_price: float = 0.5  # 0..4 reluctance to go darker than the photo
-    soften: float = 0.5  # 0..4 tips: the target is looked at this blurred
-    gap: float = 0.4  # 0..4 tips of unwanted ground a line may cross
-    single: float = 0.5  # 0..1 coherence from which lines are drawn singly, as hair is
+    spacing: Annotated[float, 0.3, 2] = 0.62  # tips between lines; below 0.5 the hatch closes
+    shortest: Annotated[float, 0.3, 20] = 2.5  # tips: shorter lines are left out
+    reach: Annotated[float, 1, 60] = 14.0  # tips: the longest line without moving the arm
+    legs: Annotated[int, 1, 60] = 10  # lines in one zigzag
+    angle: Annotated[float, -90, 90] = 0.0  # degrees against the field, so that coats cross
+    cohere: Annotated[float, 0, 6] = 1.0  # tips over which neighbours agree on a crayon
+    edge: Annotated[float, 0.1, 2] = 0.4  # tips: share of the tip that must gain; small keeps borders crisp
+    hardest: Annotated[float, 0.03, 2] = 2.0  # N/mm^2 at most, so that what lies below stays to be seen
+    gain: Annotated[float, 0, 1] = 0.02  # least gain in colour (OKLab) for which the hand moves
+    detail: Annotated[float, 0, 1] = 0.0  # only where the photo has at least this much detail
+    tone: Annotated[float, 0, 4] = 1.0  # weight of lightness against colour: small in a first coat that seeks the hue
+    dark_price: Annotated[float, 0, 4] = 0.5  # reluctance to go darker than the photo
+    soften: Annotated[float, 0, 4] = 0.5  # tips: the target is looked at this blurred
+    gap: Annotated[float, 0, 4] = 0.4  # tips of unwanted ground a line may cross
+    single: Annotated[float, 0, 1] = 0.5  # coherence from which lines are drawn singly, as hair is
 
 
 @dataclass(frozen=True)
@@ -45,37 +45,27 @@ class Style:
     """How a person draws."""
 
     title: str = ""
-    tip_mm: float = 2.4  # 0.5..30 width of the usual tip
-    crayons: int = 16  # 1..64 most crayons taken out of the box
-    recipes: int = 30  # 1..100 kinds of colour told apart
-    chroma: float = 1.0  # 0..3 colourfulness asked for
-    lift: float = 0.0  # 0..0.3 middle tones drawn lighter than they are, as paper is lighter than a photo
-    skin: float = 0.45  # 0..3 more colour for pale warm tones, so that skin stays skin
-    wrist_deg: float = -50.0  # -90..90 the hand's own direction; -50 runs from lower left to upper right
-    wrist: float = 0.3  # 0..100 how much the wrist counts against the form
-    press: float = 1.0  # 0.1..5 factor on all forces
-    force_spread: float = 0.18  # 0..1 from line to line
-    swell: float = 0.12  # 0..1 along a line
-    wobble: float = 0.05  # 0..1 tips sideways
-    overshoot: float = 0.15  # 0..3 tips beyond the ends
-    flat: float = 0.0  # 0..1 one pressure for all of a colour instead of following its tone
-    fan_deg: float = 0.0  # 0..90 spread of directions from one colour's areas to another's
-    lines: float = 1.0  # 0..5 amount of outline
+    tip_mm: Annotated[float, 0.5, 30] = 2.4  # width of the usual tip
+    crayons: Annotated[int, 1, 64] = 16  # most crayons taken out of the box
+    recipes: Annotated[int, 1, 100] = 30  # kinds of colour told apart
+    chroma: Annotated[float, 0, 3] = 1.0  # colourfulness asked for
+    lift: Annotated[float, 0, 0.3] = 0.0  # middle tones drawn lighter than they are, as paper is lighter than a photo
+    skin: Annotated[float, 0, 3] = 0.45  # more colour for pale warm tones, so that skin stays skin
+    wrist_deg: Annotated[float, -90, 90] = -50.0  # the hand's own direction; -50 runs from lower left to upper right
+    wrist: Annotated[float, 0, 100] = 0.3  # how much the wrist counts against the form
+    press: Annotated[float, 0.1, 5] = 1.0  # factor on all forces
+    force_spread: Annotated[float, 0, 1] = 0.18  # from line to line
+    swell: Annotated[float, 0, 1] = 0.12  # along a line
+    wobble: Annotated[float, 0, 1] = 0.05  # tips sideways
+    overshoot: Annotated[float, 0, 3] = 0.15  # tips beyond the ends
+    flat: Annotated[float, 0, 1] = 0.0  # one pressure for all of a colour instead of following its tone
+    fan_deg: Annotated[float, 0, 90] = 0.0  # spread of directions from one colour's areas to another's
+    lines: Annotated[float, 0, 5] = 1.0  # amount of outline
     closed: bool = False  # outlines go round whole areas instead of along edges
     lines_first: bool = False  # outlines before the fill, as children draw; drawn once more at the end
-    line_tip: float = 0.45  # 0.2..3 width of the outline's tip, in usual tips
-    line_press: float = 1.0  # 0.1..5 factor on the force of outlines
+    line_tip: Annotated[float, 0.2, 3] = 0.45  # width of the outline's tip, in usual tips
+    line_press: Annotated[float, 0.1, 5] = 1.0  # factor on the force of outlines
     passes: tuple[Pass, ...] = (Pass(),)
-
-
-_RANGES = {
-    "tip": (0.2, 4), "spacing": (0.3, 2), "shortest": (0.3, 20), "reach": (1, 60), "legs": (1, 60), "angle": (-90, 90),
-    "cohere": (0, 6), "edge": (0.1, 2), "gain": (0, 1), "hardest": (0.03, 2), "detail": (0, 1), "dark_price": (0, 4), "tone": (0, 4),
-    "soften": (0, 4), "gap": (0, 4), "single": (0, 1),
-    "tip_mm": (0.5, 30), "crayons": (1, 64), "recipes": (1, 100), "chroma": (0, 3), "skin": (0, 3), "lift": (0, 0.3), "wrist_deg": (-90, 90), "wrist": (0, 100),
-    "press": (0.1, 5), "force_spread": (0, 1), "swell": (0, 1), "wobble": (0, 1), "overshoot": (0, 3), "lines": (0, 5), "flat": (0, 1), "fan_deg": (0, 90),
-    "line_tip": (0.2, 3), "line_press": (0.1, 5),
-}  # fmt: skip
 
 
 @functools.cache
@@ -111,6 +101,8 @@ def style_from(table: dict[str, Any], where: str) -> Style:
 def _checked(table: dict[str, Any], kind: type, where: str) -> dict[str, Any]:
     """The table if every key is known, of the right type and in range."""
     known = {f.name: f for f in fields(kind) if f.name != "passes"}
+    hints = get_type_hints(kind, include_extras=True)
+    ranges = {name: hint.__metadata__ for name, hint in hints.items() if hasattr(hint, "__metadata__")}
     for key, value in table.items():
         if key not in known:
             near = difflib.get_close_matches(key, [*known, "pass"], 1, 0.4)
@@ -119,8 +111,8 @@ def _checked(table: dict[str, Any], kind: type, where: str) -> dict[str, Any]:
         right = isinstance(value, type(default)) or (isinstance(default, float) and type(value) is int)
         if not right or (isinstance(value, bool) and not isinstance(default, bool)):
             raise ValueError(f"{where}: {key} = {value!r} is not a {type(default).__name__}")
-        if key in _RANGES and not _RANGES[key][0] <= value <= _RANGES[key][1]:
-            low, high = _RANGES[key]
+        low, high = ranges.get(key, (None, None))
+        if low is not None and not low <= value <= high:
             raise ValueError(f"{where}: {key} = {value!r} is not between {low:g} and {high:g}")
     return table
 
@@ -148,7 +140,12 @@ def with_age(style: Style, age: int) -> Style:
         raise ValueError(f"age: {age} is not between 3 and 10")
     young = (10 - age) / 7
     passes = tuple(
-        replace(p, spacing=p.spacing * (0.9 + 0.35 * young), soften=p.soften * (0.6 + young), cohere=p.cohere * (0.6 + young))
+        replace(
+            p,
+            spacing=p.spacing * (0.9 + 0.35 * young),
+            soften=p.soften * (0.6 + young),
+            cohere=p.cohere * (0.6 + young),
+        )
         for p in style.passes
     )
     return replace(

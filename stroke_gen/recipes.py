@@ -63,7 +63,9 @@ def _costs(sample, a, b, grain, paper, heavy, pairs, extra, to_lms, to_lab, grai
                     white = paper[0] + paper[1] + paper[2]
                     depth = abs(below - heavy[k2]) / max(white - heavy[k2], np.float32(0.1))
                     # The first coat's flecks are covered by the share of ground the second hides.
-                    dots = dots * (a[k2, p2, 0] + a[k2, p2, 1] + a[k2, p2, 2]) / 3 + grain[k2, p2] * min(depth, np.float32(1))
+                    dots = dots * (a[k2, p2, 0] + a[k2, p2, 1] + a[k2, p2, 2]) / 3 + grain[k2, p2] * min(
+                        depth, np.float32(1)
+                    )
                     for c in range(3):
                         light[c] = a[k2, p2, c] * light[c] + b[k2, p2, c]
                 l0 = _cube_root(to_lms[0, 0] * light[0] + to_lms[0, 1] * light[1] + to_lms[0, 2] * light[2])
@@ -78,7 +80,11 @@ def _costs(sample, a, b, grain, paper, heavy, pairs, extra, to_lms, to_lab, grai
             for i in range(n):
                 least = np.float32(9)
                 for m in range(number):
-                    dl, da, db = colour[m, 0] - sample[g, i, 0], colour[m, 1] - sample[g, i, 1], colour[m, 2] - sample[g, i, 2]
+                    dl, da, db = (
+                        colour[m, 0] - sample[g, i, 0],
+                        colour[m, 1] - sample[g, i, 1],
+                        colour[m, 2] - sample[g, i, 2],
+                    )
                     least = min(least, np.sqrt(dl * dl + da * da + db * db) + price[m])
                 total += least
             cost[g, q] = total / n
@@ -112,7 +118,9 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
 def clash(one: Floats, other: Floats) -> Floats:
     """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are alike."""
     dot = (one * other).sum(-1)
-    return np.asarray(np.sqrt(np.maximum(np.hypot(one[..., 0], one[..., 1]) * np.hypot(other[..., 0], other[..., 1]) - dot, 0)))
+    return np.asarray(
+        np.sqrt(np.maximum(np.hypot(one[..., 0], one[..., 1]) * np.hypot(other[..., 0], other[..., 1]) - dot, 0))
+    )
 
 
 def _group(colours: Floats, groups: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
@@ -144,7 +152,9 @@ def nearest(colours: Floats, centres: Floats) -> NDArray[np.int64]:
     return label
 
 
-def _box(cost: Floats, pairs: NDArray[np.int64], weight: NDArray[np.float64], count: int, most: int) -> NDArray[np.bool_]:
+def _box(
+    cost: Floats, pairs: NDArray[np.int64], weight: NDArray[np.float64], count: int, most: int
+) -> NDArray[np.bool_]:
     """Which crayons to take: starting from all, put back the one least missed until `most` remain in use."""
     allowed = np.ones(count, np.bool_)
     while True:
@@ -170,7 +180,9 @@ def _agree(cost: Floats, pairs: NDArray[np.int64], centres: Floats) -> NDArray[n
     near /= np.maximum(near.sum(1, keepdims=True), 1.0)
     for _ in range(4):
         for g in range(len(centres)):
-            shared = [np.isin(pairs, pairs[best[o]]).mean(1) * near[g, o] for o in range(len(centres)) if near[g, o] > 0.02]
+            shared = [
+                np.isin(pairs, pairs[best[o]]).mean(1) * near[g, o] for o in range(len(centres)) if near[g, o] > 0.02
+            ]
             best[g] = int((cost[g] - AGREEMENT * sum(shared, np.zeros(len(pairs)))).argmin())
     return best
 

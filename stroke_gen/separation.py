@@ -6,6 +6,7 @@ which no crayon undoes.
 """
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -22,14 +23,28 @@ Floats = NDArray[np.float32]
 STRANGER_PRICE = 0.015  # a free coat keeps to the recipe's crayons unless another gains this much more
 RIVAL_SHARE = 0.55  # of the streaks' deviation: above it the rival base is taken
 UNASKED = np.float32(-0.05)
+SHARP = np.float32(1 / 0.008)  # how quickly a dearer pressure loses its say, per OKLab unit
 BAND = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What stays the same from coat to coat: the scene, the crayons and how the scene's colours are made of them."""
+
+    scene: Scene
+    swatches: Swatches
+    recipes: Recipes
+    group: NDArray[np.int64]  # (h, w) recipe of each place
+    threads: int
 
 
 _cube_root = kernel(cube_root)
 
 
 @kernel
-def _gain(top, bottom, current, lab, need, pressures, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best):  # type: ignore[no-untyped-def]
+def _gain(  # type: ignore[no-untyped-def]
+    top, bottom, current, lab, need, pressures, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best
+):
     """Best gain and pressure index of the needed crayons on rows top..bottom: gain, best (k, h, w)."""
     crayons = grain.shape[0]
     for y in range(top, bottom):
@@ -42,7 +57,11 @@ def _gain(top, bottom, current, lab, need, pressures, a, b, grain, to_lms, to_la
                 top_gain, top_p = np.float32(-9), 0
                 for p in range(pressures if k >= 0 else 1):
                     if k >= 0:
-                        r1, g1, b1 = a[k, p, 0] * r + b[k, p, 0], a[k, p, 1] * g + b[k, p, 1], a[k, p, 2] * b0 + b[k, p, 2]
+                        r1, g1, b1 = (
+                            a[k, p, 0] * r + b[k, p, 0],
+                            a[k, p, 1] * g + b[k, p, 1],
+                            a[k, p, 2] * b0 + b[k, p, 2],
+                        )
                     else:
                         r1, g1, b1 = r, g, b0
                     l0 = _cube_root(to_lms[0, 0] * r1 + to_lms[0, 1] * g1 + to_lms[0, 2] * b1)
@@ -75,10 +94,11 @@ def gains(
     pressures = max(1, int((swatches.pressures <= coat.hardest).sum()))
     gain = np.full((len(swatches.names), h, w), UNASKED, np.float32)
     best = np.zeros(gain.shape, np.int8)
+    weights = np.float32(coat.tone), np.float32(coat.dark_price), np.float32(GRAIN_PRICE)
 
     def band(top: int) -> None:
-        _gain(top, min(h, top + BAND), current, lab, need, pressures, swatches.a, swatches.b, swatches.grain, TO_LMS, TO_LAB,
-              np.float32(coat.tone), np.float32(coat.dark_price), np.float32(GRAIN_PRICE), gain, best)  # fmt: skip
+        _gain(top, min(h, top + BAND), current, lab, need, pressures, swatches.a, swatches.b, swatches.grain,
+              TO_LMS, TO_LAB, *weights, gain, best)  # fmt: skip
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(band, range(0, h, BAND)))
@@ -101,7 +121,9 @@ def _base(top, bottom, lab, group, base, shade, paper, a, b, grain, log_p, to_lm
                     for c in range(3):
                         light[c] = a[k1, p1, c] * paper[c] + b[k1, p1, c]
                     if p2 >= 0:
-                        price = price * (a[k2, p2, 0] + a[k2, p2, 1] + a[k2, p2, 2]) / 3 + np.float32(0.7) * grain[k2, p2]
+                        price = (
+                            price * (a[k2, p2, 0] + a[k2, p2, 1] + a[k2, p2, 2]) / 3 + np.float32(0.7) * grain[k2, p2]
+                        )
                         for c in range(3):
                             light[c] = a[k2, p2, c] * light[c] + b[k2, p2, c]
                     l0 = _cube_root(to_lms[0, 0] * light[0] + to_lms[0, 1] * light[1] + to_lms[0, 2] * light[2])
@@ -125,49 +147,51 @@ def _base(top, bottom, lab, group, base, shade, paper, a, b, grain, log_p, to_lm
             out[y, x] = np.exp(mean / total)
 
 
-def base_pressure(lab: Floats, group: NDArray[np.int64], recipes: Recipes, swatches: Swatches, threads: int) -> Floats:
+def base_pressure(plan: Plan, lab: Floats) -> Floats:
     """Pressure (h, w) of the base coat that, with the shade to come, brings each place nearest to its target.
 
     Choices of nearly equal worth are averaged, so pressure follows tone without steps.
     """
     out = np.empty(lab.shape[:2], np.float32)
+    recipes, swatches = plan.recipes, plan.swatches
     log_p = np.log(swatches.pressures)
 
     def band(top: int) -> None:
-        _base(top, min(len(out), top + BAND), lab, group, recipes.base, recipes.shade, swatches.paper, swatches.a,
-              swatches.b, swatches.grain, log_p, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(1 / 0.008), out)  # fmt: skip
+        _base(top, min(len(out), top + BAND), lab, plan.group, recipes.base, recipes.shade, swatches.paper,
+              swatches.a, swatches.b, swatches.grain, log_p, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), SHARP,
+              out)  # fmt: skip
 
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(plan.threads) as pool:
         list(pool.map(band, range(0, len(out), BAND)))
     return out
 
 
 def plates(
-    current: Floats, aim: Floats, group: NDArray[np.int64], swatches: Swatches, scene: Scene, recipes: Recipes,
-    coat: Pass, cells: float, flat: float, streaks: Floats, threads: int,
-) -> dict[int, Floats]:  # fmt: skip
+    plan: Plan, current: Floats, aim: Floats, coat: Pass, cells: float, flat: float, streak: Floats
+) -> dict[int, Floats]:
     """The pressure (h, w) wanted of each crayon that is wanted at all: one crayon at most in each place.
 
     The recipe says which crayon a base or shade coat takes; a free coat takes the one of most worth. A line
     goes on while the tip as a whole gains.
     """
+    swatches, recipes, group = plan.swatches, plan.recipes, plan.group
     if coat.kind == "base":
-        chosen = np.where(streaks > RIVAL_SHARE, recipes.rival[group], recipes.base[group])
+        chosen = np.where(streak > RIVAL_SHARE, recipes.rival[group], recipes.base[group])
     elif coat.kind == "shade":
         chosen = recipes.shade[group]
     else:
-        chosen = _worthiest(current, aim, group, swatches, recipes, coat, cells, threads)
+        chosen = _worthiest(plan, current, aim, coat, cells)
     reach = 2 * int(np.ceil(2 * coat.edge * cells)) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
     need = np.zeros(chosen.shape, np.uint64)
     for k in np.unique(chosen):
         need |= cv2.dilate((chosen == k).astype(np.uint8), disc).astype(np.uint64) << np.uint64(k)
-    gain, best = gains(current, aim, swatches, need, coat, threads)
+    gain, best = gains(current, aim, swatches, need, coat, plan.threads)
     steps = np.log(swatches.pressures)
-    level = np.log(base_pressure(aim, group, recipes, swatches, threads)) if coat.kind == "base" else None
+    level = np.log(base_pressure(plan, aim)) if coat.kind == "base" else None
     wants = {}
     for k in np.unique(chosen):
-        here = (chosen == k) & (scene.detail >= coat.detail) & (blur(gain[k], coat.edge * cells) > coat.gain)
+        here = (chosen == k) & (plan.scene.detail >= coat.detail) & (blur(gain[k], coat.edge * cells) > coat.gain)
         if here.any():
             log_p = blur(steps[best[k]] if level is None else level, 0.3 * cells)
             if flat > 0:
@@ -183,24 +207,22 @@ def _group_means(values: Floats, group: NDArray[np.int64], here: NDArray[np.bool
     return (total / np.maximum(count, 1))[group].astype(np.float32)
 
 
-def _worthiest(
-    current: Floats, aim: Floats, group: NDArray[np.int64], swatches: Swatches, recipes: Recipes, coat: Pass,
-    cells: float, threads: int,
-) -> NDArray[np.int64]:  # fmt: skip
+def _worthiest(plan: Plan, current: Floats, aim: Floats, coat: Pass, cells: float) -> NDArray[np.int64]:
     """The crayon (h, w) that gains most, where neighbours agree over `coat.cohere` tips; on a grid half as fine."""
     h, w = aim.shape[:2]
     half = (w // 2, h // 2)
-    group = cv2.resize(group.astype(np.int16), half, interpolation=cv2.INTER_NEAREST)
+    swatches, recipes = plan.swatches, plan.recipes
+    group = cv2.resize(plan.group.astype(np.int16), half, interpolation=cv2.INTER_NEAREST).astype(np.int64)
     used = recipes.crayons()
     need = np.full((half[1], half[0]), sum(1 << k for k in used), np.uint64)
-    small = cv2.resize(current, half, interpolation=cv2.INTER_AREA), cv2.resize(aim, half, interpolation=cv2.INTER_AREA)
-    gain, _ = gains(*small, swatches, need, coat, threads)
+    now, then = (np.asarray(cv2.resize(m, half, interpolation=cv2.INTER_AREA), np.float32) for m in (current, aim))
+    gain, _ = gains(now, then, swatches, need, coat, plan.threads)
     worth = np.full(gain.shape, -9, np.float32)
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
     for k in used:
         home = (recipes.base[group] == k) | (recipes.shade[group] == k)
         worth[k] = blur(gain[k], 0.5 * coat.cohere * cells) - np.where(home, 0, STRANGER_PRICE)
-        worth[k] -= CLASH_PRICE * clash(hues[k], small[1][..., 1:])
+        worth[k] -= CLASH_PRICE * clash(hues[k], then[..., 1:])
     return cv2.resize(worth.argmax(0).astype(np.int16), (w, h), interpolation=cv2.INTER_NEAREST).astype(np.int64)
 
 

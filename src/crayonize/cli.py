@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from . import __version__
+from .batch.options import add_options as add_folder_options
 from .did_you_mean import did_you_mean, printable
 from .settings import Settings
 
@@ -90,21 +91,27 @@ def _one_line(text: str) -> str:
 
 
 def _convert(words: Sequence[str]) -> int:
-    """crayonize PHOTO [OUT]: draw a photo."""
+    """crayonize PHOTO [OUT]: draw a photo. With folders, or several photos and -o: all of them."""
     options = _convert_parser().read(words)
     begun = time.monotonic()
-    photo = Path(options.photo)
-    out = options.out or photo.with_name(f"{photo.stem}.crayon.png")
 
     from stroke_gen import params
 
-    from . import api
+    from . import api, batch
     from .palette import load_palette
 
+    paths = [path for path in (options.photo, options.out, *options.more) if path is not None]
+    folders = batch.inputs_and_output(paths, options.output)
     chosen = {f.name: getattr(options, f.name) for f in fields(Settings) if f.name in options}
     settings = api.settings_of(chosen)
     load_palette(settings.palette)
     params.with_force(params.load_style(settings.style), settings.force)
+    if folders:
+        return batch.run_parsed(*folders, options, settings)
+
+    photo = Path(options.photo)
+    out = options.out or options.output or photo.with_name(f"{photo.stem}.crayon.png")
+    batch.check_alone(options)
     api.check_outputs([photo, *api.used_files(settings)], out, options.strokes)
     with _talk(options) as progress:
         drawing, easel = api.sketch(options.photo, settings, progress)
@@ -261,6 +268,7 @@ def _convert_parser() -> _Parser:
     parser.add_argument("photo", metavar="PHOTO", help="JPEG, PNG, WebP, TIFF or AVIF")
     add = parser.add_argument
     add("out", metavar="OUT", nargs="?", help="PNG, JPEG, WebP or TIFF; else PHOTO.crayon.png")
+    add("more", metavar="PHOTO", nargs="*", help=argparse.SUPPRESS)
     add("--palette", default=Settings.palette, help="of `crayonize palettes`, a file, or #rrggbb,... (%(default)s)")
     add("--style", default=Settings.style, help="of `crayonize styles`, or a .toml file (%(default)s)")
     add("--paper", default=Settings.paper, help="of `crayonize papers`, or a picture of one (%(default)s)")
@@ -273,6 +281,7 @@ def _convert_parser() -> _Parser:
     add("--strokes", metavar="FILE", help="save the strokes as .json, for `crayonize draw`")
     _add_size(parser)
     _add_talk(parser)
+    add_folder_options(parser)
     add("--version", action="version", version=f"crayonize {__version__}")
     return parser
 

@@ -167,7 +167,7 @@ class Desk:
 
 def check_whole(folder: Path) -> None:
     """Every picture below a folder can be decoded."""
-    for path in folder.rglob("*.png"):
+    for path in (path for path in folder.rglob("*.png") if path.is_file()):
         with Image.open(path) as picture:
             picture.load()
 

@@ -34,7 +34,6 @@ def picture_name(name: str, template: str, suffix: str, more: Mapping[str, str])
     """The picture's name for a photo's name, both relative to their folders."""
     path = PurePosixPath(name)
     values = {"stem": path.stem, "name": path.name, "suffix": path.suffix[1:], "parent": path.parent.name, **more}
-    values = {field: value.replace("/", "_").replace("\\", "_") for field, value in values.items()}
     return str(path.parent / (template.format_map(values) + suffix))
 
 

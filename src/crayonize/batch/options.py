@@ -1,8 +1,11 @@
 """What a user may choose for a batch. No heavy imports: the command line reads the defaults here."""
 
 import argparse
+import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path, PurePath
 from typing import Any
 
 from .job import MAX_BYTES, MAX_PIXELS, TIME_LIMIT
@@ -32,6 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that concern folders and lists of photos."""
     group = parser.add_argument_group("folders", "Given a folder, or several photos and -o, all are drawn.")
     add = group.add_argument
+    add("-o", "--output", metavar="FOLDER", help="where the pictures go; made if need be")
     add("-j", "--jobs", type=_count, metavar="N", help="photos drawn at once (as cores and memory allow)")
     add("--existing", choices=EXISTING, default="auto",
         help="pictures already there: auto draws anew what has changed, and so goes on after a break (%(default)s)")
@@ -54,6 +58,40 @@ def options_of(parsed: argparse.Namespace) -> Options:
     """The options among all that was parsed."""
     known: dict[str, Any] = {f.name: getattr(parsed, f.name) for f in fields(Options) if hasattr(parsed, f.name)}
     return Options(**known)
+
+
+def inputs_and_output(paths: Sequence[str], output: str | None) -> tuple[list[str], str] | None:
+    """What the names on a command line mean: photos and folders to be drawn into a folder, or None.
+
+    None stands for one photo, with or without the name of its picture. ValueError if no folder for the
+    pictures is named where one is needed.
+    """
+    if output is not None:
+        named = len(paths) == 1 and not _is_folder(paths[0]) and not _is_folder(output)
+        return None if named and PurePath(output).suffix else (list(paths), output)
+    if len(paths) == 1 and not _is_folder(paths[0]):
+        return None
+    if len(paths) == 2 and not _is_folder(paths[0]) and not _is_folder(paths[1]):
+        return None
+    if len(paths) == 1:
+        raise ValueError(f"{paths[0]!r} is a folder; name another one for its pictures")
+    if len(paths) > 2 and not _is_folder(paths[-1]):
+        raise ValueError(f"{paths[-1]!r} is no folder; name one for the pictures with -o FOLDER")
+    return list(paths[:-1]), paths[-1]
+
+
+def _is_folder(path: str) -> bool:
+    """Whether a path is, or is meant as, a folder."""
+    return path.endswith(("/", os.sep)) or "://" in path or Path(path).is_dir()
+
+
+def check_alone(parsed: argparse.Namespace) -> None:
+    """ValueError if one photo alone is given options that only mean something for folders."""
+    parser = argparse.ArgumentParser(add_help=False)
+    add_options(parser)
+    for name, default in vars(parser.parse_args([])).items():
+        if name != "output" and getattr(parsed, name) != default:
+            raise ValueError(f"--{name.replace('_', '-')} is for folders, or several photos and -o FOLDER")
 
 
 def _count(text: str) -> int:

@@ -94,6 +94,11 @@ def entries(paths: Sequence[str]) -> Iterator[Entry]:
                 yield prefix + entry[0], entry[1]
 
 
+def _place(path: str) -> str:
+    """Where a path lies, itself perhaps a link."""
+    return os.path.join(os.path.realpath(os.path.dirname(path)), os.path.basename(path))
+
+
 def _full(path: str) -> str:
     """A path without dots, its links as they are."""
     return os.path.normpath(Path(path).absolute())
@@ -110,7 +115,8 @@ def _named_file(path: str, place: str) -> Entry:
 def check_apart(paths: Sequence[str], output: str, jobs: Sequence[Job]) -> None:
     """ValueError if pictures would land among the photos, by whatever links, or in the place of one."""
     folders = [path for path in paths if os.path.isdir(path)]
-    photos = {folded(os.path.realpath(path)) for path in paths if path not in folders}
+    files = [path for path in paths if path not in folders]
+    photos = {folded(os.path.realpath(path)) for path in files} | {folded(_place(path)) for path in files}
     for path in folders:
         if _lies_in(output, path) or _lies_in(path, output):
             raise ValueError(f"{output!r} and {path!r} lie in one another; photos and pictures need two folders")

@@ -6,7 +6,6 @@ no UTF-8 stand as \\xff escapes, and the exact name follows in base64.
 
 import base64
 import contextlib
-import errno
 import json
 import os
 import sys
@@ -20,6 +19,10 @@ from .job import STATUSES, Outcome
 _BAD = ("failed", "died", "timeout")
 _EVERY = 0.1  # s between two states of the bar
 _WIDTH = 20
+
+
+class ReportError(Exception):
+    """Stdout takes no more lines."""
 
 
 class Report:
@@ -36,7 +39,7 @@ class Report:
         self._bar.total += jobs
 
     def file(self, name: str, outcome: Outcome, out: str | None = None) -> None:
-        """Tell of one file. OSError if stdout takes no more."""
+        """Tell of one file. ReportError if that is not possible."""
         self.counts[outcome.status] += 1
         if self._json:
             line: dict[str, Any] = _named("in", name) | (_named("out", out) if out else {}) | {"status": outcome.status}
@@ -91,10 +94,15 @@ def _named(key: str, name: str) -> dict[str, str]:
 
 
 def _print(line: str) -> None:
-    """A line for programs; OSError if it cannot be written."""
+    """A line for programs."""
     if sys.stdout is None:
-        raise OSError(errno.EBADF, "stdout is closed")
-    print(line, flush=True)
+        raise ReportError("stdout is closed")
+    try:
+        print(line, flush=True)
+    except OSError as error:
+        with contextlib.suppress(OSError):  # or what is still in its buffer would fail again at the end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise ReportError(error.strerror) from error
 
 
 def _tell(text: str) -> None:

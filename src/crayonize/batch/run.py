@@ -17,7 +17,7 @@ from .names import check_template
 from .options import Options
 from .output import OutputFolder
 from .plan import Plan, Planner, check_apart, entries, sources
-from .report import Report
+from .report import Report, ReportError
 
 
 def run(inputs: Sequence[str], output: str, options: Options, recipe: Recipe, *,
@@ -42,6 +42,9 @@ def run(inputs: Sequence[str], output: str, options: Options, recipe: Recipe, *,
     try:
         with folder.held():
             return _draw(plan, folder, options, recipe, report, render, memory_limit)
+    except ReportError as error:
+        report.say(f"stopped: the report cannot be written ({error})")
+        return 1
     except lock.Busy:
         report.say(f"another run is at work in {output!r}; wait for its end, or choose another folder")
         return 4
@@ -122,14 +125,10 @@ def _draw(plan: Plan, folder: OutputFolder, options: Options, recipe: Recipe, re
         code, reason = 1, str(error)
     finally:
         crew.close()
-    try:
-        for job in left:
-            report.file(job.photo.name, Outcome("not_run"), job.out)
-        code = code or (3 if report.bad else 0)
-        report.end(code, reason, plan.elsewhere)
-    except OSError as error:
-        report.say(f"stopped: the report cannot be written ({error.strerror})")
-        code = code or 1
+    for job in left:
+        report.file(job.photo.name, Outcome("not_run"), job.out)
+    code = code or (3 if report.bad else 0)
+    report.end(code, reason, plan.elsewhere)
     return code
 
 
