@@ -4,7 +4,7 @@ All maps live on the work grid, a few cells to a crayon's width, whatever the si
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -15,7 +15,10 @@ from .params import Style
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
+Box = tuple[float, float, float, float]  # x, y, width, height in fractions of the picture
 WORK_LONG = 640  # cells along the work grid's long side
+CALM = 0.6  # tips: windows over which colours are calmed
+RIM = 0.005  # of the long side: a frame that is not drawn
 FACE_SIDE = 320  # pixels in which faces are looked for
 WARM = np.deg2rad(58)  # OKLab hue of skin
 
@@ -26,6 +29,7 @@ class Scene:
 
     target: Floats  # (h, w, 3) linear colours the drawing should show from afar
     lab: Floats  # (h, w, 3) the same as OKLab, chroma doubled
+    calm: Floats  # (h, w, 3) linear: flat areas with crisp borders, what a thick crayon aims at
     tangent: Floats  # (h, w, 2) unit vector along which strokes run, x then y
     coherence: Floats  # (h, w) 0 no direction of its own .. 1 one clear direction
     detail: Floats  # (h, w) 0 plain .. 1 eyes, lettering, edges
@@ -57,20 +61,21 @@ def far(linear: Floats) -> Floats:
     return oklab(blur(linear, 0.012 * max(linear.shape)))
 
 
-def read(linear: Floats, width_mm: float, height_mm: float, tip_mm: float, wrist_deg: float, wrist: float,
-         focus: Sequence[tuple[float, float, float, float]]) -> Scene:  # fmt: skip
-    """Analyse a photo in linear light for a sheet of the given size.
+def read(
+    photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, focus: Sequence[Box]
+) -> Scene:
+    """Analyse a photo in linear light for a sheet of the given size, as far as these crayons can draw it.
 
-    tip_mm: width of the usual crayon; wrist_deg, wrist: the hand's own direction and how much it counts;
     focus: boxes (x, y, w, h) in fractions of the picture that deserve care.
     """
     cell_mm = max(width_mm, height_mm) / WORK_LONG
-    target = fit(linear, work_shape(width_mm, height_mm))
-    lab = oklab(target)
-    tip = tip_mm / cell_mm
-    tangent, coherence = orientation(lab, tip, np.deg2rad(wrist_deg), wrist)
-    boxes = [*focus, *faces(target)]
-    return Scene(target, lab, tangent, coherence, detail(lab, tip, boxes), cell_mm)
+    tip = style.tip_mm / cell_mm
+    seen = unframed(fit(photo, work_shape(width_mm, height_mm)))
+    lab = tone_map(oklab(seen), swatches, style)
+    target = from_oklab(lab)
+    calm = calmed(target, max(1, round(CALM * tip)))
+    tangent, coherence = orientation(oklab(calm), tip, np.deg2rad(style.wrist_deg), style.wrist)
+    return Scene(target, lab, calm, tangent, coherence, detail(lab, tip, [*focus, *faces(seen)]), cell_mm)
 
 
 def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tuple[Floats, Floats]:
@@ -87,7 +92,7 @@ def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tupl
     # The stroke runs along the edge: the double angle of the gradient, turned by half a turn.
     tensor = np.dstack([(g - e) * limit, -2 * f * limit, (e + g) * limit]).astype(np.float32)
     total = np.zeros_like(tensor)
-    for share, scale in ((1.0, 0.35), (0.25, 1.0), (0.08, 3.0)):
+    for share, scale in ((1.0, 0.5), (0.6, 1.6), (0.3, 5.0)):
         total += np.float32(share) * blur(tensor, scale * tip)
     strength = np.hypot(total[..., 0], total[..., 1])
     coherence = strength / (total[..., 2] + 1e-6)
@@ -104,6 +109,30 @@ def _scharr(image: Floats, dx: int, dy: int) -> Floats:
     return np.asarray(cv2.Scharr(image, cv2.CV_32F, dx, dy, scale=1 / 32, borderType=cv2.BORDER_REFLECT), np.float32)
 
 
+def calmed(linear: Floats, radius: int) -> Floats:
+    """Kuwahara's filter: each place takes the mean of the quietest of the four windows it is a corner of.
+
+    Texture goes, borders stay and the half-tones along them vanish, so no grey rims are drawn.
+    """
+    side = radius + 1
+    brightness = linear.sum(2)
+    quiet, out = np.full(brightness.shape, np.inf, np.float32), linear.copy()
+    for anchor in ((0, 0), (radius, 0), (0, radius), (radius, radius)):
+        mean, square = (cv2.boxFilter(m, cv2.CV_32F, (side, side), anchor=anchor) for m in (brightness, brightness**2))
+        spread = square - mean * mean
+        quieter = spread < quiet
+        quiet[quieter] = spread[quieter]
+        out[quieter] = cv2.boxFilter(linear, cv2.CV_32F, (side, side), anchor=anchor)[quieter]
+    return out
+
+
+def unframed(linear: Floats) -> Floats:
+    """The outermost cells replaced by their inner neighbours: scans have dark rims that nobody would draw."""
+    rim = max(1, round(RIM * max(linear.shape)))
+    inner = linear[rim:-rim, rim:-rim]
+    return np.pad(inner, ((rim, rim), (rim, rim), (0, 0)), mode="edge") if min(inner.shape[:2]) > rim else linear
+
+
 def detail(lab: Floats, tip: float, focus: Sequence[tuple[float, float, float, float]]) -> Floats:
     """Where a sharpened tip is worth taking: fine local contrast that rises over its surroundings."""
     fine = np.sqrt(blur(((lab - blur(lab, 0.8 * tip)) ** 2).sum(2), 0.6 * tip))
@@ -117,7 +146,7 @@ def detail(lab: Floats, tip: float, focus: Sequence[tuple[float, float, float, f
     return np.asarray(level, np.float32)
 
 
-def faces(target: Floats) -> list[tuple[float, float, float, float]]:
+def faces(target: Floats) -> list[Box]:
     """Boxes (x, y, w, h), in fractions of the picture, where scikit-image's LBP cascade sees a face.
 
     A bonus: it misses many faces, so it is asked strictly and nothing depends on it.
@@ -154,17 +183,17 @@ def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:
     return np.ascontiguousarray(np.dstack([c * x - s * y, s * x + c * y]), np.float32)
 
 
-def tone_map(scene: Scene, swatches: Swatches, style: Style) -> Scene:
-    """The photo's range brought into what paper and crayons can give: lightness squeezed at its two ends."""
+def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
+    """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in order."""
     lightest = float(oklab(swatches.paper[None])[0, 0])
     darkest = float(swatches.lightness().min())
-    lab = scene.lab.copy()
+    out = lab.copy()
     low, high = np.percentile(lab[..., 0], (0.5, 99.5))
     low, high = min(float(low), darkest + 0.02), max(float(high), lightest)
-    lab[..., 0] = darkest + (np.clip(lab[..., 0], low, high) - low) / max(high - low, 1e-6) * (lightest - darkest)
-    lab[..., 0] += 4 * style.lift * lab[..., 0] * (1 - lab[..., 0])
+    out[..., 0] = darkest + (np.clip(lab[..., 0], low, high) - low) / max(high - low, 1e-6) * (lightest - darkest)
+    out[..., 0] += 4 * style.lift * out[..., 0] * (1 - out[..., 0])
     chroma = np.hypot(lab[..., 1], lab[..., 2])
     warm = np.clip((lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1)
     shy = np.exp(-((chroma / 0.18) ** 2)) * np.clip(chroma / 0.05, 0, 1)
-    lab[..., 1:] *= (style.chroma * (1 + style.skin * warm**2 * shy))[..., None]
-    return replace(scene, lab=lab, target=from_oklab(lab))
+    out[..., 1:] *= (style.chroma * (1 + style.skin * warm**2 * shy))[..., None]
+    return out

@@ -15,6 +15,7 @@ from .swatches import Swatches
 
 Floats = NDArray[np.float32]
 AGREE = 0.45  # tips over which neighbours agree on a recipe
+RAGGED = 0.12  # of all votes: how raggedly one recipe gives way to the next
 FAR_SIGHT = 0.8  # how much a free coat makes up for colours that are off when seen from afar
 Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
 
@@ -29,10 +30,11 @@ def generate(
     light on a grid of `shape`: the generator steps back and looks before each coat.
     """
     rng = np.random.default_rng([seed, 3])
-    scene = analysis.read(photo, width_mm, height_mm, style.tip_mm, style.wrist_deg, style.wrist, focus)
-    scene = analysis.tone_map(scene, swatches, style)
-    mixes = recipes.find(scene.lab, swatches, style.recipes, style.crayons, rng)
-    group = separation.grouped(scene.lab, mixes, AGREE * style.tip_mm / scene.cell_mm)
+    scene = analysis.read(photo, width_mm, height_mm, swatches, style, focus)
+    mixes = recipes.find(oklab(scene.calm), swatches, style.recipes, style.crayons, rng)
+    tip = style.tip_mm / scene.cell_mm
+    ragged = RAGGED * separation.streaks(scene.detail.shape, tip, style.wrist_deg, rng)
+    group = separation.grouped(oklab(scene.calm), mixes, AGREE * tip, ragged)
     fan = style.fan_deg * rng.standard_normal(len(mixes.base)).astype(np.float32)
     scene = replace(scene, tangent=analysis.turned(scene.tangent, fan[group]))
     plan = Plan(scene, swatches, mixes, group, threads)
@@ -53,11 +55,11 @@ def _coat(plan: Plan, now: Floats, coat: Pass, style: Style, rng: np.random.Gene
     width = coat.tip * style.tip_mm
     tip = Tip("sharp" if coat.sharp else "blunt", width)
     cells = width / scene.cell_mm
-    aim = oklab(analysis.blur(scene.target, coat.soften * 0.5 * cells))
+    seen = scene.target if coat.detail > 0 else scene.calm
+    aim = oklab(analysis.blur(seen, coat.soften * 0.5 * cells))
     if coat.kind == "free":
         aim = aim + np.float32(FAR_SIGHT) * (analysis.far(scene.target) - analysis.far(now))
-    h, w = plan.group.shape
-    streak = separation.streaks(h, w, cells, style.wrist_deg, rng)
+    streak = separation.streaks(plan.group.shape, cells, style.wrist_deg, rng)
     wants = separation.plates(plan, analysis.blur(now, 0.5 * cells), aim, coat, cells, style.flat, streak)
     tangent = analysis.turned(scene.tangent, np.float32(coat.angle))
     how = hatching.Hatch(

@@ -226,21 +226,25 @@ def _worthiest(plan: Plan, current: Floats, aim: Floats, coat: Pass, cells: floa
     return cv2.resize(worth.argmax(0).astype(np.int16), (w, h), interpolation=cv2.INTER_NEAREST).astype(np.int64)
 
 
-def grouped(lab: Floats, recipes: Recipes, sigma: float) -> NDArray[np.int64]:
-    """The recipe (h, w) of each place: its nearest group of colours, after neighbours have agreed."""
+def grouped(lab: Floats, recipes: Recipes, sigma: float, ragged: Floats) -> NDArray[np.int64]:
+    """The recipe (h, w) of each place: its nearest group of colours, after neighbours have voted.
+
+    `ragged` (h, w) tilts the votes to and fro in streaks, so that areas meet as hatching does.
+    """
     label = nearest(lab * np.array([TONE, 1, 1], np.float32), recipes.centres)
     most, winner = np.full(label.shape, -1, np.float32), np.zeros(label.shape, np.int64)
     for g in range(len(recipes.centres)):
         votes = blur((label == g).astype(np.float32), sigma)
+        votes += ragged * (votes > 0.02) * (1 if g % 2 else -1)
         winner[votes > most] = g
         most = np.maximum(most, votes)
     return winner
 
 
-def streaks(h: int, w: int, cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:
+def streaks(shape: tuple[int, ...], cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:
     """Noise of unit variance in streaks along the wrist's direction, about one line wide and ten long."""
     angle = np.deg2rad(wrist_deg)
-    y, x = np.mgrid[:h, :w].astype(np.float32)
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
     along = (x * np.cos(angle) + y * np.sin(angle)) / (9 * cells)
     across = (y * np.cos(angle) - x * np.sin(angle)) / (1.3 * cells)
     along, across = along - along.min(), across - across.min()

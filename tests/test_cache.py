@@ -167,8 +167,8 @@ def test_many_processes_start_at_once(tmp_path):
         "import numpy as np; print(optics._over(*[np.float32(x) for x in (0.8, 0.3, 0.4)]))"
     )
     environment = {**os.environ, "CRAYONIZE_CACHE": str(tmp_path / "shared"), "CRAYONIZE_NO_CACHE": ""}
-    command = [sys.executable, "-c", code]
-    runs = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for _ in range(6)]
+    command, pipe = [sys.executable, "-c", code], subprocess.PIPE
+    runs = [subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe) for _ in range(6)]
     said = {run.communicate() for run in runs}
     assert len(said) == 1 and said.pop()[1] == b""
     entries = list((tmp_path / "shared").glob("kernels-*/*"))

@@ -15,7 +15,7 @@ from stroke_gen.jit import kernel
 
 from .wax import Sheet
 
-LIGHT = 0.02  # change of brightness per 1/100 of slope, before saturation
+LIGHT = 0.007  # change of brightness per 1/100 of slope, before saturation
 BAND = 128  # rows rendered by one task
 
 

@@ -34,6 +34,10 @@ SPACING = 0.62  # of the tip, between two lines of a hatching
 SAME = 0.04  # OKLab distance up to which a fill counts as bare paper
 GRID_MM = 0.25  # of the map of what covers what
 STEP_MM = 0.5  # between points where visibility is asked
+MOST_FILLED = 60  # times the sheet's area
+MOST_CROSSED = 100_000_000  # sides of a shape times rows of its hatching ...
+MOST_SPANS = 300  # ... and parts of a row; what is shredded finer keeps its edge alone
+MAX_POINTS = 2_000_000
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +56,7 @@ def load_svg(
     """Read an SVG file as a drawing.
 
     sheet_mm: long side of the sheet if the file gives its size in pixels or not at all. widths: what a line's
-    width becomes, "tip" or "force". say: gets one line about what was left out. Needs the extra `svg`.
+    width becomes, "tip" or "force". say: gets one line about what was left out.
     ValueError, one line with the name of the file, for anything that cannot be drawn.
     """
     name = repr(os.fspath(path))
@@ -101,20 +105,36 @@ def _lab_of(colour: RGB) -> NDArray[np.float32]:
 
 def _strokes(page: Page, chooser: _Chooser, widths: str) -> Iterator[Stroke]:
     cover = _cover(page)
+    filled = points = 0.0
     usual = float(np.median([s.width_mm for s in page.shapes if s.stroke] or [1.0]))
     for number, shape in enumerate(page.shapes, 1):
         visible = _Visible(cover, number, page.width_mm, page.height_mm)
+        made: list[Stroke] = []
         if shape.fill and not chooser.is_paper(shape.fill):
-            yield from _filled(shape, number, shape.data.get("data-crayon") or chooser.crayon(shape.fill), visible)
+            filled += _extent(shape, page)
+            if filled > MOST_FILLED:
+                raise ValueError(f"planes cover the sheet more than {MOST_FILLED} times")
+            made += _filled(shape, number, _named(shape, shape.fill, chooser), visible)
         if shape.stroke:
-            yield from _drawn(shape, _named(shape, chooser), visible, widths, usual)
+            made += _drawn(shape, _named(shape, shape.stroke, chooser), visible, widths, usual)
+        points += sum(len(s.path_mm) for s in made)
+        if points > MAX_POINTS:
+            raise ValueError(f"lines and hatchings have more than {MAX_POINTS:,} points")
+        yield from made
 
 
-def _named(shape: Shape, chooser: _Chooser) -> str:
-    """The crayon that the file names, as ours do, or the nearest to the line's colour."""
+def _extent(shape: Shape, page: Page) -> float:
+    """The area of the box around a shape, as a share of the sheet."""
+    sheet = np.array([page.width_mm, page.height_mm])
+    low = np.min([line.min(0) for line in shape.lines], 0).clip(0, sheet)
+    high = np.max([line.max(0) for line in shape.lines], 0).clip(0, sheet)
+    return float((high - low).prod() / sheet.prod())
+
+
+def _named(shape: Shape, colour: RGB, chooser: _Chooser) -> str:
+    """The crayon that the file names, as ours do, or the nearest to a colour."""
     named = shape.data.get("data-crayon", "")
-    assert shape.stroke
-    return named if named in chooser.names else chooser.crayon(shape.stroke)
+    return named if named in chooser.names else chooser.crayon(colour)
 
 
 def _drawn(shape: Shape, crayon: str, visible: "_Visible", widths: str, usual_mm: float) -> Iterator[Stroke]:
@@ -140,7 +160,7 @@ def _drawn(shape: Shape, crayon: str, visible: "_Visible", widths: str, usual_mm
 
 def _filled(shape: Shape, number: int, crayon: str, visible: "_Visible") -> Iterator[Stroke]:
     """A plane: its edge, then a hatching inside; or, if it is thin, its edge alone."""
-    rings = [line for line in shape.lines if len(line) > 2]
+    rings = [visible.clamped(line) for line in shape.lines if len(line) > 2]
     thick = _thickness(rings)
     thin = thick < THIN_MM
     width = float(np.clip(thick if thin else thick / 4, *FILL_TIP_MM))
@@ -246,6 +266,10 @@ class _Visible:
                 if b - a > 1:
                     yield fine[a:b, :2], fine[a:b, 2]
 
+    def clamped(self, ring: Floats) -> Floats:
+        """A ring whose points far off the sheet are brought near, so that no row is hatched in vain."""
+        return np.clip(ring, -self.sheet, 2 * self.sheet)
+
     def _seen(self, points: Floats) -> NDArray[np.bool_]:
         inside = ((points >= 0) & (points <= self.sheet)).all(1)
         cell = np.clip(np.nan_to_num(points) / GRID_MM, 0, np.array(self.cover.shape)[::-1] - 1).astype(int)
@@ -295,9 +319,15 @@ def _hatching(rings: list[Floats], gap: float, turn: float, inset: float, even_o
     a = np.concatenate(rings) @ axes.T
     b = np.concatenate([np.roll(ring, -1, 0) for ring in rings]) @ axes.T
     open_lines: list[list[tuple[float, float]]] = []
-    for y in np.arange(a[:, 1].min() + gap / 2, a[:, 1].max(), gap):
+    rows = np.arange(a[:, 1].min() + gap / 2, a[:, 1].max(), gap)
+    if len(rows) * len(a) > MOST_CROSSED:
+        return
+    for y in rows:
         still: list[list[tuple[float, float]]] = []
-        for ends in _crossed(a, b, float(y), inset, even_odd):
+        spans = _crossed(a, b, float(y), inset, even_odd)
+        if len(spans) > MOST_SPANS:
+            return
+        for ends in spans:
             line = next((o for o in open_lines if min(abs(o[-1][0] - x) for x in ends) < 2 * gap), None)
             if line is not None:
                 open_lines.remove(line)

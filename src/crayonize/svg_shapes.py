@@ -5,21 +5,21 @@ transforms, viewBox, units, presentation attributes, simple style sheets, opacit
 colour). Left out: text, pictures, filters, masks, clipping, patterns, markers, dashes.
 """
 
-import importlib.util
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .svg_path import Outline, outlines
 from .svg_xml import MAX_DEPTH, MAX_ELEMENTS, Element, declarations, style_rules
 
 MAX_POINTS = 1_000_000
-STEP_MM = 0.6  # between the points of a curve
 MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 PX_MM = 25.4 / 96
+PX_PER = {unit: mm / PX_MM for unit, mm in MM.items()} | {"": 1.0, "px": 1.0}
 SMALLEST_MM, LARGEST_MM = 10.0, 2000.0  # long side of a sheet whose size stands in the file
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,10 @@ _INHERITED = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity"
               "data-crayon", "data-tip", "data-angle", "data-note")  # fmt: skip
 _GROUPS = ("g", "a", "switch", "svg", "symbol", "use")
 _SHAPES = ("path", "line", "polyline", "polygon", "rect", "circle", "ellipse")
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Z%]*)\s*")
+_NUMBER = re.compile(r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s?([a-zA-Z%]*)")
+_CALL = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
+_RGB = re.compile(r"rgba?\(\s*([0-9.]+%?(?:[\s,/]+[0-9.]+%?){2,3})\s*\)")
+_PART = re.compile(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)(%?)")
 
 
 @dataclass
@@ -62,8 +65,6 @@ def page(root: Element, long_mm: float) -> Page:
 
     ValueError, without the name of the file before it, for what cannot be drawn.
     """
-    if not importlib.util.find_spec("svgelements"):
-        raise ValueError("reading SVG needs svgelements: pip install 'crayonize[svg]'")
     fitted = _fit(root, long_mm)
     if fitted is None:  # no size and no viewBox: what is drawn fills the sheet
         loose = _Walk(root, np.eye(3)).shapes
@@ -105,7 +106,7 @@ def _fit(root: Element, long_mm: float) -> tuple[float, float, Floats] | None:
 def _size(root: Element, name: str) -> tuple[float, bool] | None:
     """Width or height in mm, and whether in a unit of paper; None if absent or relative."""
     text = root.attributes.get(name, "100%")
-    found = _NUMBER.fullmatch(text)
+    found = _NUMBER.fullmatch(text.strip())
     unit = found[2].lower() if found else ""
     if found is None or unit not in (*MM, "", "px", "%", "em", "ex"):
         raise ValueError(f"{name} is {text[:40]!r}; it must be a length like 210mm")
@@ -154,7 +155,7 @@ class _Walk:
         self.shapes: list[Shape] = []
         self.left_out: dict[str, int] = {}
         self.visited = self.points = 0
-        self._outlines: dict[int, list[list[Floats]]] = {}
+        self._outlines: dict[int, list[Outline]] = {}
         self._name(root)
         style = self._style(root, {"fill": "black", "stroke": "none", "stroke-width": "1", "color": "black"})
         self.unit_mm = _scale(matrix)
@@ -183,7 +184,7 @@ class _Walk:
         opacity *= _opacity(style)
         if style.get("display") == "none" or opacity < 0.02:
             return
-        matrix = matrix @ _transform(element.attributes.get("transform") or style.get("transform", ""))
+        matrix = _product(matrix, transform(element.attributes.get("transform") or style.get("transform", "")))
         if element.tag in _SHAPES:
             if style.get("visibility") not in ("hidden", "collapse"):
                 self._add(element, matrix, style, opacity)
@@ -191,10 +192,11 @@ class _Walk:
             x, y = (_length(element.attributes.get(axis, "0")) for axis in "xy")
             target = self.ids.get(element.attributes.get("href", "")[1:])
             if target is not None:
-                self._visit(target, matrix @ _moved(x, y), {**style, "through": "use"}, opacity, depth + 1)
+                self._visit(target, _product(matrix, _moved(x, y)), {**style, "through": "use"}, opacity, depth + 1)
         else:
+            matrix = _product(matrix, _inner(element))
             for child in element.children:
-                self._visit(child, matrix @ _inner(element), style, opacity, depth + 1)
+                self._visit(child, matrix, style, opacity, depth + 1)
 
     def _style(self, element: Element, above: Mapping[str, str]) -> dict[str, str]:
         """The properties of an element: inherited, then its attributes, the style sheet's, its own style."""
@@ -215,8 +217,9 @@ class _Walk:
             fill = None
             if stroke is None:
                 return
-        lines = [_flat(curve, matrix) for curve in self._outline(element)]
-        lines = [line for line in lines if len(line)]
+        if not math.isfinite(width):
+            raise ValueError(f"<{element.tag}> has a stroke-width beyond all bounds")
+        lines = [outline.polyline(matrix) for outline in self._outline(element)]
         self.points += sum(map(len, lines))
         if self.points > MAX_POINTS:
             raise ValueError(f"more than {MAX_POINTS:,} points")
@@ -231,10 +234,10 @@ class _Walk:
                       fill_opacity, style.get("fill-rule") == "evenodd", data)
             )  # fmt: skip
 
-    def _outline(self, element: Element) -> list[list[Floats]]:
-        """Subpaths of an element in its own units, as control points; kept, as <use> may come back."""
+    def _outline(self, element: Element) -> list[Outline]:
+        """Subpaths of an element in its own units; kept, as <use> may come back."""
         if id(element) not in self._outlines:
-            self._outlines[id(element)] = _subpaths(_path_data(element))
+            self._outlines[id(element)] = outlines(_path_data(element))
         return self._outlines[id(element)]
 
     def _colour(self, style: Mapping[str, str], name: str) -> RGB | None:
@@ -282,27 +285,52 @@ def _scale(matrix: Floats) -> float:
     return math.sqrt(abs(float(matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])))
 
 
-def _transform(text: str) -> Floats:
-    from svgelements import Matrix
-
-    if not text or text == "none":
-        return np.eye(3)
-    try:
-        m = Matrix(text)
-        made = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f], [0, 0, 1]], np.float64)
-    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError):
-        raise ValueError(f"transform is {text[:40]!r}; it cannot be understood") from None
+def _product(a: Floats, b: Floats) -> Floats:
+    with np.errstate(over="ignore", invalid="ignore"):
+        made = np.asarray(a @ b)
     if not np.isfinite(made).all():
-        raise ValueError(f"transform is {text[:40]!r}; its numbers are beyond all bounds")
+        raise ValueError("transforms multiply to numbers beyond all bounds")
     return made
+
+
+def transform(text: str) -> Floats:
+    """The matrix of a transform attribute (SVG 1.1, 7.6)."""
+    matrix = np.eye(3)
+    rest = _CALL.sub("", text).strip(" ,\t\r\n")
+    for name, inside in _CALL.findall(text):
+        try:
+            v = [float(part) * PX_PER.get(unit, 1.0) for part, unit in _NUMBER.findall(inside)]
+            matrix = _product(matrix, _call(name, *v))
+        except (TypeError, OverflowError):
+            rest = text
+    if rest and rest != "none":
+        raise ValueError(f"transform is {text[:40]!r}; it cannot be understood")
+    return matrix
+
+
+def _call(name: str, *v: float) -> Floats:
+    if name == "matrix":
+        a, b, c, d, e, f = v if len(v) == 6 else (None,) * 6
+        return np.array([[a, c, e], [b, d, f], [0, 0, 1]], np.float64)
+    if name == "translate":
+        return _moved(*(*v, 0.0)[:2])
+    if name == "scale":
+        return np.diag([v[0], (*v, v[0])[1], 1.0])
+    angle = math.radians(v[0])
+    if name == "rotate":
+        x, y = v[1:] or (0.0, 0.0)
+        turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+        return np.asarray(_moved(x, y) @ turn @ _moved(-x, -y))
+    slant = math.tan(angle)
+    return np.array([[1, slant if name == "skewX" else 0, 0], [slant if name == "skewY" else 0, 1, 0], [0, 0, 1]])
 
 
 def _length(text: str, otherwise: float = 0.0) -> float:
     """A length in user units (px); relative ones are not understood and count as `otherwise`."""
-    found = _NUMBER.fullmatch(text)
+    found = _NUMBER.fullmatch(text.strip())
     if not found or found[2] in ("%", "em", "ex"):
         return otherwise
-    return float(found[1]) * MM.get(found[2].lower(), PX_MM) / PX_MM
+    return float(found[1]) * PX_PER.get(found[2].lower(), 1.0)
 
 
 def _opacity(style: Mapping[str, str]) -> float:
@@ -311,26 +339,33 @@ def _opacity(style: Mapping[str, str]) -> float:
 
 def _alpha(style: Mapping[str, str], name: str) -> float:
     """The opacity of a fill or stroke, with that of its colour."""
-    from svgelements import Color
-
     own = min(max(_length(style.get(f"{name}-opacity", "1"), 1.0), 0.0), 1.0)
-    text = style.get(name, "")
-    return own * (Color(text).alpha / 255 if "rgba" in text or len(text) in (5, 9) and text[0] == "#" else 1.0)
+    colour = _rgba(style.get(name, ""))
+    return own * (colour[3] if colour else 1.0)
+
+
+def _rgba(text: str) -> tuple[float, float, float, float] | None:
+    """A CSS colour as sRGB and opacity, 0..1; None for none and for what is no colour."""
+    from PIL import ImageColor
+
+    text = text.strip().lower()
+    if found := _RGB.fullmatch(text):
+        parts = [float(n) / (100 if unit else 255 if i < 3 else 1) for i, (n, unit) in enumerate(_PART.findall(found[1]))]
+        r, g, b, a = (min(max(part, 0.0), 1.0) for part in (*parts, 1.0)[:4])
+        return r, g, b, a
+    try:
+        codes = (*ImageColor.getrgb(text), 255)
+    except ValueError:
+        return None
+    return codes[0] / 255, codes[1] / 255, codes[2] / 255, codes[3] / 255
 
 
 def _rgb(text: str) -> RGB | None:
-    from svgelements import Color
-
-    if text in ("none", "transparent", "") or text.startswith("context-"):
-        return None
-    try:
-        colour = Color(text)
-        return colour.red / 255, colour.green / 255, colour.blue / 255
-    except (ValueError, TypeError, IndexError):
-        return None
+    colour = _rgba(text)
+    return colour[:3] if colour and colour[3] > 0 else None
 
 
-# ---- outlines ----------------------------------------------------------------------------------------------
+# ---- shapes as paths ----------------------------------------------------------------------------------------------
 
 
 def _path_data(element: Element) -> str:
@@ -363,64 +398,3 @@ def _rectangle(x: float, y: float, width: float, height: float, rx: float | None
     turn = f"a{rx},{ry} 0 0 1 "
     return (f"M{x + rx},{y}h{width - 2 * rx}{turn}{rx},{ry}v{height - 2 * ry}{turn}{-rx},{ry}"
             f"h{2 * rx - width}{turn}{-rx},{-ry}v{2 * ry - height}{turn}{rx},{-ry}Z")  # fmt: skip
-
-
-def _subpaths(data: str) -> list[list[Floats]]:
-    """Path data as subpaths, each a list of control points: (1, 2) a point to go to straight, (3, 2) a cubic."""
-    from svgelements import Arc, Close, CubicBezier, Line, Move, Path, QuadraticBezier
-
-    path = Path()
-    try:
-        path.parse(data)
-    except (ValueError, IndexError, TypeError, AttributeError, ArithmeticError):
-        pass  # what stands before the fault is drawn, as the standard asks
-    made: list[list[Floats]] = []
-    for segment in path:
-        if isinstance(segment, Move):
-            made.append([_at(segment.end)])
-        elif isinstance(segment, Line | Close) and segment.end is not None and made:
-            made[-1].append(_at(segment.end))
-        elif isinstance(segment, CubicBezier):
-            made[-1].append(_at(segment.control1, segment.control2, segment.end))
-        elif isinstance(segment, QuadraticBezier):
-            a, b, c = _at(segment.start)[0], _at(segment.control)[0], _at(segment.end)[0]
-            made[-1].append(np.array([a + (b - a) * 2 / 3, c + (b - c) * 2 / 3, c]))
-        elif isinstance(segment, Arc):
-            made[-1] += list(_cubics(segment))
-    return made
-
-
-def _cubics(arc: "object") -> Iterator[Floats]:
-    for cubic in arc.as_cubic_curves():  # type: ignore[attr-defined]
-        yield _at(cubic.control1, cubic.control2, cubic.end)
-
-
-def _at(*points: object) -> Floats:
-    return np.array([(p.x, p.y) for p in points], np.float64)  # type: ignore[attr-defined]
-
-
-def _flat(curve: list[Floats], matrix: Floats) -> Floats:
-    """A subpath as a polyline (n, 2) on the sheet."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        controls = np.concatenate(curve) @ matrix[:2, :2].T + matrix[:2, 2]
-        ends = np.cumsum([len(c) for c in curve])
-        parts, before = [], controls[:1]
-        for part, end in zip(curve, ends, strict=True):
-            points = controls[end - len(part) : end]
-            if len(part) == 3:
-                points = _cubic(np.concatenate([before, points]))
-            parts.append(points)
-            before = points[-1:]
-    line: Floats = np.concatenate(parts)
-    keep = np.ones(len(line), bool)
-    keep[1:] = (np.abs(np.diff(line, axis=0)) > 1e-9).any(1)
-    return line[keep] if keep.sum() > 1 else line[:1]
-
-
-def _cubic(control: Floats) -> Floats:
-    """Points along a Bezier curve, without its first."""
-    length = float(np.hypot(*np.diff(control, axis=0).T).sum())
-    n = int(min(max(4, length / STEP_MM), 400)) if math.isfinite(length) else 4
-    t = np.arange(1, n + 1)[:, None] / n
-    u = 1 - t
-    return np.asarray(u**3 * control[0] + 3 * u * u * t * control[1] + 3 * u * t * t * control[2] + t**3 * control[3])
