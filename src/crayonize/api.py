@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
-    from PIL.Image import Image
+    from PIL.Image import Exif, Image
 
     from stroke_gen.drawing import Drawing
 
@@ -200,10 +200,12 @@ def finish(
     *,
     light: bool,
     settings: Settings | None = None,
+    kept: Exif | None = None,
 ) -> NDArray[np.uint8]:
     """The picture as uint8 sRGB; written to `out` and its strokes to `strokes` if these are given.
 
     settings: of the photo, to be noted in the picture beside what the drawing itself says.
+    kept: tags of the photo that go into the picture, see metadata.py.
     """
     from stroke_gen.drawing import save_drawing
 
@@ -214,7 +216,7 @@ def finish(
     if out is not None:
         dpi = easel.sheet.cols / drawing.width_mm * _MM_PER_INCH
         told = notes(drawing, settings) | {"light": light, "smears": easel.smears}
-        write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None)
+        write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None, kept=kept)
     if strokes is not None:
         save_drawing(drawing, strokes)
     return picture

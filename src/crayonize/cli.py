@@ -19,7 +19,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from . import __version__
+from . import __version__, metadata, page
 from .batch.options import add_options as add_folder_options
 from .did_you_mean import did_you_mean, printable
 from .settings import Settings
@@ -113,9 +113,11 @@ def _convert(words: Sequence[str]) -> int:
     out = options.out or options.output or photo.with_name(f"{photo.stem}.crayon.png")
     batch.check_alone(options)
     api.check_outputs([photo, *api.used_files(settings)], out, options.strokes)
+    settings = page.fitted_to(settings, options.print, options.dpi, photo)
+    kept = metadata.kept_of(photo, options.metadata)
     with _talk(options) as progress:
         drawing, easel = api.sketch(options.photo, settings, progress)
-        api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings)
+        api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings, kept=kept)
     if options.verbose or (options.out is None and not options.quiet):
         _report(out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
@@ -278,6 +280,10 @@ def _convert_parser() -> _Parser:
     add("--seed", type=_seed, default=Settings.seed, help="a whole number, or `random` (%(default)s)")
     add("--focus", type=_focus, action="append", default=[], metavar="X,Y,W,H",
         help="a part that deserves care, in fractions of the picture; may be repeated")  # fmt: skip
+    add("--print", choices=page.PAGES, help="fill a page of this size")
+    add("--dpi", type=_dpi, help="pixels to the inch, in place of --size (300 with --print)")
+    add("--metadata", choices=metadata.CHOICES, default="safe",
+        help="what the photo tells of itself: safe keeps title, names and date, but no place (%(default)s)")  # fmt: skip
     add("--strokes", metavar="FILE", help="save the strokes as .json, for `crayonize draw`")
     _add_size(parser)
     _add_talk(parser)
@@ -314,6 +320,16 @@ def _whole(text: str) -> int:
         return int(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+
+
+def _dpi(text: str) -> float:
+    try:
+        dpi = float(text)
+    except ValueError:
+        dpi = 0
+    if not 1 <= dpi <= 4800:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 to 4800")
+    return dpi
 
 
 def _seed(text: str) -> int:

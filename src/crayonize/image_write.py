@@ -34,17 +34,18 @@ def write_image(
     settings: Settings | None = None,
     dpi: float | None = None,
     quality: int = 95,
+    kept: Image.Exif | None = None,
 ) -> None:
     """Write a picture so that its name never stands for half a file: the old one, the new one, or none.
 
     path: PNG, JPEG, WebP or TIFF by its suffix; a link is replaced, never written through.
     srgb8: uint8 (h, w, 3), sRGB-encoded. settings: stored inside, see read_settings. dpi: pixels per inch on
-    paper. quality: 1..100, of JPEG and WebP. The sRGB profile goes in, no time does.
+    paper. quality: 1..100, of JPEG and WebP. kept: tags of the photo, see metadata.py. The sRGB profile goes in, no time does.
     ValueError for what the caller can mend; OSError with the path if the disk is full or refuses.
     """
     target, format_ = Path(os.fsdecode(path)), file_format(path)
     _check_target(target)
-    data = _encode(srgb8, format_, shown(path), settings or {}, dpi, quality)
+    data = _encode(srgb8, format_, shown(path), settings or {}, dpi, quality, kept)
     try:
         _put(target, data)
     except OSError as error:
@@ -94,8 +95,9 @@ def _check_target(target: Path) -> None:
 
 
 def _encode(
-    srgb8: NDArray[np.uint8], format_: str, name: str, settings: Settings, dpi: float | None, quality: int
-) -> BytesIO:
+    srgb8: NDArray[np.uint8], format_: str, name: str, settings: Settings, dpi: float | None, quality: int,
+    kept: Image.Exif | None,
+) -> BytesIO:  # fmt: skip
     """The whole file in memory, where no full disk can hurt it."""
     if srgb8.dtype != np.uint8 or srgb8.ndim != 3 or srgb8.shape[2] != 3 or srgb8.size == 0:
         raise ValueError(
@@ -114,7 +116,7 @@ def _encode(
         text = json.dumps(settings, sort_keys=True, allow_nan=False) if settings else None
     except (ValueError, TypeError) as error:
         raise ValueError(f"{name}: settings: {error}; they must be text or finite numbers") from error
-    data, options = BytesIO(), _options(format_, text, dpi, quality)
+    data, options = BytesIO(), _options(format_, text, dpi, quality, kept)
     try:
         Image.fromarray(srgb8).save(data, format_, **options)
     except ValueError as error:
@@ -122,7 +124,9 @@ def _encode(
     return data
 
 
-def _options(format_: str, text: str | None, dpi: float | None, quality: int) -> dict[str, Any]:
+def _options(
+    format_: str, text: str | None, dpi: float | None, quality: int, kept: Image.Exif | None
+) -> dict[str, Any]:
     """What Pillow's writer of each format is to be told. text: the settings as JSON (ASCII)."""
     options: dict[str, Any] = {"icc_profile": _srgb_profile()}
     if format_ == "PNG":
@@ -130,8 +134,10 @@ def _options(format_: str, text: str | None, dpi: float | None, quality: int) ->
         notes.add_text("Software", SOFTWARE)
         if text is not None:
             notes.add_itxt(SOFTWARE, text)
+        if kept is not None:
+            options["exif"] = kept
     else:
-        options["exif"] = _exif(text, dpi)
+        options["exif"] = _exif(text, dpi, kept)
     if dpi is not None and format_ in ("PNG", "JPEG"):
         options["dpi"] = (dpi, dpi)
     if format_ == "TIFF":
@@ -143,9 +149,9 @@ def _options(format_: str, text: str | None, dpi: float | None, quality: int) ->
     return options
 
 
-def _exif(text: str | None, dpi: float | None) -> Image.Exif:
+def _exif(text: str | None, dpi: float | None, kept: Image.Exif | None) -> Image.Exif:
     """The settings as the picture's description, the one text tag that JPEG, WebP and TIFF all keep."""
-    exif = Image.Exif()
+    exif = Image.Exif() if kept is None else kept
     exif[_EXIF_SOFTWARE] = SOFTWARE
     if text is not None:
         exif[_EXIF_DESCRIPTION] = f'{{"{SOFTWARE}": {text}}}'

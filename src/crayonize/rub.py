@@ -23,8 +23,9 @@ from .wax import Physics, Sheet, _rub
 
 STEP = 0.14  # of the tip's width, between two contacts: below the wavelength of the bumps
 SHARPEN_UM = 36.0  # mean height lost before a tip is turned or sharpened
-WEAR_LEVELS = 4  # masks between sharp and worn
-FACES = 8  # different sets of bumps
+WEAR_LEVELS = 3  # masks between sharp and worn
+FACES = 4  # different sets of bumps
+HEADINGS = 12  # directions in which the bumps are drawn out, over half a turn
 
 Progress = Callable[[int, int], None]
 
@@ -45,26 +46,28 @@ class Box:
         self.palette, self.constants, self.cell_mm, self.seed = palette, constants, cell_mm, seed
         self.worn_um: dict[tuple[str, Tip], float] = {}
         self.given_mm3: dict[str, float] = {}
-        self._index: dict[tuple[Tip, int, int], int] = {}
+        self._index: dict[tuple[Tip, int, int, int], int] = {}
         self.masks: list[NDArray[np.float32]] = []
 
-    def take(self, stroke: Stroke, newton_mm: float) -> int:
-        """Which of `masks` draws this stroke; carries the crayon's wear on by force times length."""
+    def take(self, stroke: Stroke, newton_mm: float, heading: int) -> int:
+        """Which of `masks` draws this stroke along one of HEADINGS; carries the wear on by force times length."""
         key = (stroke.crayon, stroke.tip)
         worn = self.worn_um.get(key, 0.0)
         area_mm2 = 0.785 * stroke.tip.width_mm**2
         self.worn_um[key] = worn + worn_per_newton_mm(self.constants) * newton_mm / area_mm2
         face, rest = divmod(worn, SHARPEN_UM)
-        shape = (stroke.tip, (int(face) + len(stroke.crayon)) % FACES, int(rest / SHARPEN_UM * WEAR_LEVELS))
+        face = (int(face) + len(stroke.crayon)) % FACES
+        shape = (stroke.tip, face, int(rest / SHARPEN_UM * WEAR_LEVELS), heading)
         if shape not in self._index:
             self._index[shape] = len(self.masks)
             self.masks.append(self._mask(*shape))
         return self._index[shape]
 
-    def _mask(self, shape: Tip, face: int, level: int) -> NDArray[np.float32]:
+    def _mask(self, shape: Tip, face: int, level: int, heading: int) -> NDArray[np.float32]:
         rng = np.random.default_rng([self.seed, 11, face])
         worn_um = level / WEAR_LEVELS * SHARPEN_UM
-        return np.pad(tip.mask(shape, self.cell_mm, worn_um, rng), 1, constant_values=tip.ABSENT)
+        turned = tip.mask(shape, self.cell_mm, worn_um, rng, np.pi * heading / HEADINGS)
+        return np.pad(turned, 1, constant_values=tip.ABSENT)
 
     def stacked(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """All masks as rows of one array, and the side of each."""
@@ -95,7 +98,8 @@ def rub(
     points, first = _points(strokes, sheet.cell_mm)
     forces, cells = _work(points, first)
     wax_of = np.array([box.palette.index(s.crayon) for s in strokes], np.int64)
-    mask_of = np.array([box.take(s, n * sheet.cell_mm) for s, n in zip(strokes, forces, strict=True)], np.int64)
+    drawn = zip(strokes, forces * sheet.cell_mm, _headings(points, first), strict=True)
+    mask_of = np.array([box.take(stroke, newton_mm, heading) for stroke, newton_mm, heading in drawn], np.int64)
     masks, sides = box.stacked()
     side_of = sides[mask_of]
     level = schedule.levels(points, first, (side_of / 2 + 2).astype(np.float32), sheet.rows, sheet.cols)
@@ -138,6 +142,16 @@ def _work(points: NDArray[np.float32], first: NDArray[np.int64]) -> tuple[NDArra
     step[first[1:-1] - 1] = 0  # from one stroke to the next the crayon is lifted
     step = np.append(step, 0.0)
     return np.add.reduceat(step * points[:, 2], first[:-1]), np.add.reduceat(step, first[:-1])
+
+
+def _headings(points: NDArray[np.float32], first: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Mean direction of each stroke, to and fro counting alike, as one of HEADINGS."""
+    step = np.append(np.diff(points[:, :2], axis=0), [[0, 0]], 0).astype(np.float64)
+    step[first[1:-1] - 1] = 0
+    x, y = step.T
+    length = np.maximum(np.hypot(x, y), 1e-9)
+    double = np.add.reduceat(((x * x - y * y) + 2j * x * y) / length, first[:-1])
+    return np.round(np.angle(double) / 2 / np.pi * HEADINGS).astype(np.int64) % HEADINGS
 
 
 def _by_level(level: NDArray[np.int32]) -> Iterable[NDArray[np.int64]]:

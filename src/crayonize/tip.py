@@ -17,16 +17,19 @@ if TYPE_CHECKING:
 
 ABSENT = np.float32(1e9)
 BUMP_UM = 16.0  # about a third of a drawing paper's tooth
-BUMP_MM = 0.32  # wavelength of the bumps
+BUMP_MM = 0.3  # wavelength of the bumps across the crayon's way ...
+GROOVE = 5.0  # ... and how many times longer they are along it
 SIDE_MM = 2.6  # breadth of the strip on which a lying crayon touches the paper
 DROPS_UM = {"sharp": 110.0, "blunt": 32.0, "rim": 60.0, "side": 40.0}  # centre to edge
 
 
-def mask(tip: "Tip", cell_mm: float, worn_um: float, rng: np.random.Generator) -> NDArray[np.float32]:
+def mask(
+    tip: "Tip", cell_mm: float, worn_um: float, rng: np.random.Generator, heading_rad: float = 0.0
+) -> NDArray[np.float32]:
     """The mask of a tip on a grid of `cell_mm`, after `worn_um` of its height has been rubbed off.
 
     Returns (n, n) float32 in um with n odd, the lowest present cell at 0. Wear cuts the profile flat
-    from below, as drawing does.
+    from below, as drawing does, and leaves grooves along `heading_rad`, the way the crayon has moved.
     """
     if tip.kind not in DROPS_UM:
         raise ValueError(f"tip.kind: {tip.kind!r} is none of {', '.join(DROPS_UM)}")
@@ -40,7 +43,7 @@ def mask(tip: "Tip", cell_mm: float, worn_um: float, rng: np.random.Generator) -
     radius = np.hypot(x, y)
     rise, present = _profile(tip, along, across, radius)
     present[n // 2, n // 2] |= not present.any()  # finer than a cell
-    height = DROPS_UM[tip.kind] * rise + BUMP_UM * _bumps(n, BUMP_MM / cell_mm, rng)
+    height = DROPS_UM[tip.kind] * rise + BUMP_UM * _bumps(n, BUMP_MM / cell_mm, heading_rad, rng)
     height = np.maximum(height, height[present].min() + worn_um)
     height -= height[present].min()
     return np.where(present, height, ABSENT).astype(np.float32)
@@ -60,9 +63,14 @@ def _profile(
     return (across / breadth) ** 2, (np.abs(across) <= breadth) & (np.abs(along) <= 1)
 
 
-def _bumps(n: int, wavelength: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Smooth noise in [-1, 1] with the given wavelength in cells."""
+def _bumps(n: int, wavelength: float, heading_rad: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Smooth noise in [-1, 1], `wavelength` cells across the heading and GROOVE times that along it."""
+    across = max(0.3 * wavelength, 0.4)
+    along = GROOVE * across
+    reach = int(np.ceil(2.5 * along))
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    u = (x * np.cos(heading_rad) + y * np.sin(heading_rad)) / along
+    v = (y * np.cos(heading_rad) - x * np.sin(heading_rad)) / across
     noise = rng.standard_normal((n, n)).astype(np.float32)
-    sigma = max(0.3 * wavelength, 0.3)
-    smooth = cv2.GaussianBlur(noise, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)
+    smooth = cv2.filter2D(noise, -1, np.exp(-0.5 * (u * u + v * v)).astype(np.float32), borderType=cv2.BORDER_REFLECT)
     return np.clip(smooth / (2 * smooth.std() + 1e-9), -1, 1).astype(np.float64)

@@ -15,5 +15,6 @@ def run_parsed(inputs: Sequence[str], output: str, parsed: argparse.Namespace, s
     """`run` with what the command line holds."""
     if parsed.strokes:
         raise ValueError("--strokes is for one photo")
-    recipe = Recipe(settings, parsed.light, max_pixels=parsed.max_pixels, max_bytes=parsed.max_bytes)
+    recipe = Recipe(settings, parsed.light, parsed.metadata, parsed.print, parsed.dpi, parsed.max_pixels,
+                    parsed.max_bytes)  # fmt: skip
     return run(inputs, output, options_of(parsed), recipe)

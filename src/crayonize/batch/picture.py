@@ -7,9 +7,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from .. import api
+from PIL.Image import Exif
+
+from .. import api, metadata, page
 from ..image_read import open_picture
 from ..image_write import read_settings, same_file
+from ..settings import Settings
 from . import memory
 from .job import Job, Outcome, Recipe
 
@@ -51,17 +54,17 @@ class Studio:
 
     def _make(self, job: Job, ask: Ask) -> Outcome:
         recipe, source, target = self._recipe, job.photo.source, Path(job.target)
-        needed = self._look_at(source)
+        settings, kept, needed = self._look_at(source)
         if not ask(needed):
             raise ValueError(f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first")
         if same_file(source, target):
             raise ValueError("its picture would take its own place; choose another output folder")
         if job.strange and not _is_ours(target):
             raise ValueError(f"at {job.out!r} stands something that was not made here; --existing skip or overwrite")
-        drawing, easel = self._sketch(source, recipe.settings)
+        drawing, easel = self._sketch(source, settings)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            api.finish(drawing, easel, target, light=recipe.light, settings=recipe.settings)
+            api.finish(drawing, easel, target, light=recipe.light, settings=settings, kept=kept)
             _keep_name(target.parent)
         except OSError as error:
             if error.errno == errno.ENAMETOOLONG:
@@ -69,17 +72,22 @@ class Studio:
             raise OutputError(f"{error.filename or job.out}: {error.strerror or error}") from error
         return Outcome("ok", bytes=target.stat().st_size, strokes=len(drawing.strokes))
 
-    def _look_at(self, source: str) -> int:
-        """Bytes of memory it will take, by the header alone; ValueError for a photo beyond the limits."""
+    def _look_at(self, source: str) -> tuple[Settings, Exif | None, int]:
+        """Settings for this photo, tags to keep, and bytes of memory it will take, all by its header alone.
+
+        ValueError for a photo beyond the limits.
+        """
         recipe = self._recipe
         size = Path(source).stat().st_size
         if size > recipe.max_bytes:
             raise ValueError(f"has {size} bytes; the limit is {recipe.max_bytes} (--max-bytes)")
         with open_picture(source) as (picture, _):
-            pixels = picture.width * picture.height
-            if pixels > recipe.max_pixels:
-                raise ValueError(f"has {pixels} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
-            return memory.need(str(picture.format), pixels, recipe.settings.size)
+            width, height = picture.size
+            if width * height > recipe.max_pixels:
+                raise ValueError(f"has {width * height} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
+            settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, width, height)
+            needed = memory.need(str(picture.format), width * height, settings.size)
+            return settings, metadata.kept(picture, recipe.metadata), needed
 
 
 def _check(recipe: Recipe) -> None:
