@@ -185,8 +185,8 @@ def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:
 
 def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
     """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in order."""
-    lightest = float(oklab(swatches.paper[None])[0, 0])
-    darkest = float(swatches.lightness().min())
+    given = np.append(swatches.lightness(), oklab(swatches.paper)[0])  # on dark paper crayons are the light
+    darkest, lightest = float(given.min()), float(given.max())
     out = lab.copy()
     low, high = np.percentile(lab[..., 0], (0.5, 99.5))
     low, high = min(float(low), darkest + 0.02), max(float(high), lightest)

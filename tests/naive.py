@@ -26,8 +26,8 @@ class Column:
     def wax(self) -> float:
         return float(self.blend[0]) + sum(height for _, height in self.layers)
 
-    def top(self) -> float:
-        return self.paper + self.wax()
+    def top(self, firm: float = 1.0) -> float:
+        return self.paper + firm * self.wax()
 
 
 def columns_of(sheet: Sheet) -> dict[tuple[int, int], Column]:
@@ -150,10 +150,10 @@ def deposit(columns, over, tops, direction, own, mask, push, rate, film, mu_pape
     return lost
 
 
-def under_tip(columns, mask, top, left):
+def under_tip(columns, mask, top, left, firm=1.0):
     """Gap between sheet and mask for the present cells of a tip that lie on the sheet."""
     return {
-        (top + j, left + i): columns[top + j, left + i].top() - float(mask[j, i])
+        (top + j, left + i): columns[top + j, left + i].top(firm) - float(mask[j, i])
         for j, i in np.ndindex(mask.shape)
         if mask[j, i] < 1e8 and (top + j, left + i) in columns
     }
@@ -161,7 +161,7 @@ def under_tip(columns, mask, top, left):
 
 def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, optics):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
-    mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _, heap = (float(c) for c in constants)
+    mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _, heap, firm = (float(c) for c in constants)
     points, mask = points.astype(float), mask.astype(float)
     side = mask.shape[0]
     ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
@@ -180,13 +180,13 @@ def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, o
         dither_x, dither_y = (0.5 + contact * 0.7548776662) % 1, (0.5 + contact * 0.5698402910) % 1
         contact += 1
         left, top = math.floor(x - 0.5 + dither_x) - side // 2, math.floor(y - 0.5 + dither_y) - side // 2
-        gaps = under_tip(columns, mask, top, left)
+        gaps = under_tip(columns, mask, top, left, firm)
         if not gaps:
             continue
         wanted = force * per_lambda * len(gaps) / int((mask < 1e8).sum())
         h = balance(list(gaps.values()), wanted)
         over = {cell: gap - h for cell, gap in gaps.items() if gap > h}
-        tops = {cell: column.top() for cell, column in columns.items()}
+        tops = {cell: column.top(firm) for cell, column in columns.items()}
         own = {}
         if smears:
             own = smear(columns, over, tops, direction, wax, 1 - (1 - nu) ** stride, alpha, beta, optics)

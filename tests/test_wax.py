@@ -57,7 +57,8 @@ class Window:
         blended = np.zeros((size, wax.BLEND), np.float32)
         self.moves = np.empty(room, np.int64), np.empty(room, np.uint8), np.empty(room, np.float32), blended
         self.inside = wax._look(
-            self.mask, self.side, top, left, sheet.rows, sheet.cols, sheet.paper, sheet.total, self.surface, self.gap
+            self.mask, self.side, top, left, sheet.rows, sheet.cols, np.float32(1), sheet.paper, sheet.total,
+            self.surface, self.gap,
         )
         self.h, self.contacts = wax._balance(
             self.gap, size, np.float32(wanted), np.float32(1e9), np.float32(1e-3), self.over, self.touch

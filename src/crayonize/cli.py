@@ -103,7 +103,7 @@ def _convert(words: Sequence[str]) -> int:
     paths = [path for path in (options.photo, options.out, *options.more) if path is not None]
     folders = batch.inputs_and_output(paths, options.output)
     chosen = {f.name: getattr(options, f.name) for f in fields(Settings) if f.name in options}
-    settings = api.settings_of(chosen)
+    settings = api.settings_of(chosen | {"focus": tuple(options.focus)})
     load_palette(settings.palette)
     params.with_force(params.load_style(settings.style), settings.force)
     if folders:

@@ -17,6 +17,7 @@ from PIL import Image, ImageCms, PngImagePlugin
 
 from .image_read import open_picture, shown
 from .image_scan import exif_tag
+from .metadata import flat
 
 SOFTWARE = "crayonize"  # the name under which settings are found again
 Settings = dict[str, str | int | float]
@@ -137,7 +138,7 @@ def _options(
         if kept is not None:
             options["exif"] = kept
     else:
-        options["exif"] = _exif(text, dpi, kept)
+        options["exif"] = _exif(text, dpi, flat(kept) if kept is not None and format_ == "TIFF" else kept)
     if dpi is not None and format_ in ("PNG", "JPEG"):
         options["dpi"] = (dpi, dpi)
     if format_ == "TIFF":

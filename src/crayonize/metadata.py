@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 CHOICES = ("none", "safe", "all")
 
 _EXIF_FOLDER, _GPS_FOLDER = 0x8769, 0x8825
-_TITLE, _DESCRIPTION = 40091, 270
+_TITLE, _DESCRIPTION, _DATE, _DATE_TAKEN = 40091, 270, 306, 36867
 _SAFE = frozenset((_TITLE, 315, 33432))  # title, artist, copyright
-_SAFE_INSIDE = frozenset((36867, 36880, 36881, 37520, 37521))  # when it was taken: date, offset, fractions
+_SAFE_INSIDE = frozenset((_DATE_TAKEN, 36880, 36881, 37520, 37521))  # when it was taken: date, offset, fractions
 _COLOUR_SPACE, _SRGB = 40961, 1
 _LAYOUT = frozenset(  # sizes, strips, tiles, resolution, orientation, software, profile, previews, packed metadata
     (*range(254, 270), *range(273, 285), 296, 301, 305, *range(317, 348), *range(512, 533), 700, 33723, 34377,
@@ -57,6 +57,17 @@ def kept_of(photo: str | os.PathLike[str], which: str) -> Exif | None:
 
     with open_picture(photo) as (picture, _):
         return kept(picture, which)
+
+
+def flat(exif: Exif) -> Exif:
+    """The same without folders, as the writer of compressed TIFF knows none; the date becomes that of the file."""
+    date = exif.get_ifd(_EXIF_FOLDER).get(_DATE_TAKEN)
+    for folder in (_EXIF_FOLDER, _GPS_FOLDER):
+        exif.pop(folder, None)
+        exif.get_ifd(folder).clear()
+    if date is not None:
+        exif[_DATE] = date
+    return exif
 
 
 def _add_folder(exif: Exif, folder: int, tags: dict[int, Any]) -> None:

@@ -34,10 +34,11 @@ SPACING = 0.62  # of the tip, between two lines of a hatching
 SAME = 0.04  # OKLab distance up to which a fill counts as bare paper
 GRID_MM = 0.25  # of the map of what covers what
 STEP_MM = 0.5  # between points where visibility is asked
-MOST_FILLED = 60  # times the sheet's area
-MOST_CROSSED = 100_000_000  # sides of a shape times rows of its hatching ...
-MOST_SPANS = 300  # ... and parts of a row; what is shredded finer keeps its edge alone
+MOST_FILLED = 30  # times the sheet's area
+MOST_CROSSED = 200  # times a row crosses the edge of a shape, in the mean; what is shredded finer is not filled
 MAX_POINTS = 2_000_000
+MAX_LENGTH_MM = 3_000_000.0  # of all lines
+MARGIN_MM = 10.0  # around the sheet, where a crayon may still reach in
 
 Floats = NDArray[np.float64]
 
@@ -105,10 +106,11 @@ def _lab_of(colour: RGB) -> NDArray[np.float32]:
 
 def _strokes(page: Page, chooser: _Chooser, widths: str) -> Iterator[Stroke]:
     cover = _cover(page)
+    visible = _Visible(cover, np.array([page.width_mm, page.height_mm]))
     filled = points = 0.0
     usual = float(np.median([s.width_mm for s in page.shapes if s.stroke] or [1.0]))
     for number, shape in enumerate(page.shapes, 1):
-        visible = _Visible(cover, number, page.width_mm, page.height_mm)
+        visible.number = number
         made: list[Stroke] = []
         if shape.fill and not chooser.is_paper(shape.fill):
             filled += _extent(shape, page)
@@ -160,7 +162,8 @@ def _drawn(shape: Shape, crayon: str, visible: "_Visible", widths: str, usual_mm
 
 def _filled(shape: Shape, number: int, crayon: str, visible: "_Visible") -> Iterator[Stroke]:
     """A plane: its edge, then a hatching inside; or, if it is thin, its edge alone."""
-    rings = [visible.clamped(line) for line in shape.lines if len(line) > 2]
+    edges = [line for line in shape.lines if len(line) > 2]
+    rings = _planes(edges, visible.sheet)
     thick = _thickness(rings)
     thin = thick < THIN_MM
     width = float(np.clip(thick if thin else thick / 4, *FILL_TIP_MM))
@@ -168,7 +171,7 @@ def _filled(shape: Shape, number: int, crayon: str, visible: "_Visible") -> Iter
     force = _force(tip) * (0.3 + 0.7 * shape.fill_opacity)
     if shape.stroke is None:
         edge = tip if thin else Tip("sharp", max(FILL_TIP_MM[0], width / 2))
-        for ring in rings:
+        for ring in edges:
             ring = np.concatenate([ring, ring[:1]])
             for path, forces in visible.parts(ring, np.full(len(ring), force * (edge.width_mm / width) ** 2)):
                 yield _stroke(path, forces, crayon, edge, "line")
@@ -221,8 +224,7 @@ def _thickness(rings: list[Floats]) -> float:
     """Of a plane inside rings: twice the area over the length of its edge; the width, if it is a strip."""
     if not rings:
         return 0.0
-    low, high = (np.array([f(r, axis=0) for r in rings]) for f in (np.min, np.max))
-    low, high = low.min(0), high.max(0)
+    low, high = np.min([r.min(0) for r in rings], 0), np.max([r.max(0) for r in rings], 0)
     pixel = max(float((high - low).max()) / 400, 1e-6)
     picture = np.zeros(np.ceil((high - low) / pixel).astype(int)[::-1] + 1, np.uint8)
     cv2.fillPoly(picture, [np.round((r - low) / pixel * 16).astype(np.int32) for r in rings], 1, cv2.LINE_8, 4)
@@ -238,16 +240,47 @@ def _cover(page: Page) -> NDArray[np.int32]:
     cover = np.zeros((int(page.height_mm / GRID_MM) + 2, int(page.width_mm / GRID_MM) + 2), np.int32)
     for number, shape in enumerate(page.shapes, 1):
         if shape.fill is not None and shape.fill_opacity > 0.9:
-            rings = [np.clip(line / GRID_MM * 16, -1e7, 1e7).astype(np.int32) for line in shape.lines if len(line) > 2]
-            cv2.fillPoly(cover, rings, number, cv2.LINE_8, 4)
+            rings = _planes(shape.lines, np.array([page.width_mm, page.height_mm]))
+            cv2.fillPoly(cover, [np.round(r / GRID_MM * 16).astype(np.int32) for r in rings], number, cv2.LINE_8, 4)
     return cover
 
 
-class _Visible:
-    """Which parts of a line lie on the sheet and under no later shape."""
+def _planes(lines: list[Floats], sheet: Floats) -> list[Floats]:
+    """The rings of a filled shape, cut off a little outside the sheet; none if they are shredded too finely."""
+    rings = [_cut(line, sheet) for line in lines if len(line) > 2]
+    rings = [ring for ring in rings if len(ring) > 2]
+    if not rings:
+        return []
+    for axis in (0, 1):
+        travel = sum(float(np.abs(np.diff(r[:, axis], append=r[0, axis])).sum()) for r in rings)
+        extent = max(float(r[:, axis].max()) for r in rings) - min(float(r[:, axis].min()) for r in rings)
+        if travel > MOST_CROSSED * max(extent, 1e-6):
+            return []
+    return rings
 
-    def __init__(self, cover: NDArray[np.int32], number: int, width_mm: float, height_mm: float) -> None:
-        self.cover, self.number, self.sheet = cover, number, np.array([width_mm, height_mm])
+
+def _cut(ring: Floats, sheet: Floats) -> Floats:
+    """A ring cut by four half-planes 1 mm outside the sheet (Sutherland and Hodgman 1974)."""
+    for axis, bound, side in ((0, -1.0, 1), (1, -1.0, 1), (0, sheet[0] + 1, -1), (1, sheet[1] + 1, -1)):
+        over = side * (ring[:, axis] - bound)
+        if (over >= 0).all():
+            continue
+        after, over_after = np.roll(ring, -1, 0), np.roll(over, -1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = ring + (over / (over - over_after))[:, None] * (after - ring)
+        pairs = np.stack([ring, crossing], 1).reshape(-1, 2)
+        ring = pairs[np.stack([over >= 0, (over >= 0) != (over_after >= 0)], 1).ravel()]
+        if len(ring) == 0:
+            break
+    return ring
+
+
+class _Visible:
+    """Which parts of a line of shape `number` lie on the sheet or near, and under no later shape."""
+
+    def __init__(self, cover: NDArray[np.int32], sheet: Floats) -> None:
+        self.cover, self.sheet, self.number, self.length_mm = cover, sheet, 0, 0.0
+        self.low, self.high = np.full(2, -MARGIN_MM), sheet + MARGIN_MM
 
     def parts(self, line: Floats, force: Floats) -> Iterator[tuple[Floats, Floats]]:
         """Pieces (n, 2) of a line, with the force along them (n,)."""
@@ -256,6 +289,9 @@ class _Visible:
                 yield line, force
             return
         for piece in self._on_sheet(np.column_stack([line, force])):
+            self.length_mm += float(np.hypot(*np.diff(piece[:, :2], axis=0).T).sum())
+            if self.length_mm > MAX_LENGTH_MM:
+                raise ValueError(f"lines and hatchings are longer than {MAX_LENGTH_MM / 1e6:g} km in all")
             fine = _resampled(piece)
             seen = self._seen(fine[:, :2])
             if seen.all():
@@ -266,25 +302,21 @@ class _Visible:
                 if b - a > 1:
                     yield fine[a:b, :2], fine[a:b, 2]
 
-    def clamped(self, ring: Floats) -> Floats:
-        """A ring whose points far off the sheet are brought near, so that no row is hatched in vain."""
-        return np.clip(ring, -self.sheet, 2 * self.sheet)
-
     def _seen(self, points: Floats) -> NDArray[np.bool_]:
-        inside = ((points >= 0) & (points <= self.sheet)).all(1)
+        inside = ((points >= self.low) & (points <= self.high)).all(1)
         cell = np.clip(np.nan_to_num(points) / GRID_MM, 0, np.array(self.cover.shape)[::-1] - 1).astype(int)
         return np.asarray(inside & (self.cover[cell[:, 1], cell[:, 0]] <= self.number))
 
     def _on_sheet(self, line: Floats) -> Iterator[Floats]:
         """Pieces of a line (n, 3) inside the sheet: each step is cut by the four edges (Liang and Barsky 1984)."""
-        if ((line[:, :2] >= 0) & (line[:, :2] <= self.sheet)).all():
+        if ((line[:, :2] >= self.low) & (line[:, :2] <= self.high)).all():
             yield line
             return
         start, step = line[:-1], np.diff(line, axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = np.stack([-start[:, :2] / step[:, :2], (self.sheet - start[:, :2]) / step[:, :2]])
+            t = np.stack([(self.low - start[:, :2]) / step[:, :2], (self.high - start[:, :2]) / step[:, :2]])
         flat = step[:, :2] == 0
-        within = (start[:, :2] >= 0) & (start[:, :2] <= self.sheet)
+        within = (start[:, :2] >= self.low) & (start[:, :2] <= self.high)
         enter = np.where(flat, np.where(within, 0, 2), t.min(0)).max(1).clip(0)
         leave = np.where(flat, 1, t.max(0)).min(1).clip(max=1)
         piece: list[Floats] = []
@@ -319,15 +351,9 @@ def _hatching(rings: list[Floats], gap: float, turn: float, inset: float, even_o
     a = np.concatenate(rings) @ axes.T
     b = np.concatenate([np.roll(ring, -1, 0) for ring in rings]) @ axes.T
     open_lines: list[list[tuple[float, float]]] = []
-    rows = np.arange(a[:, 1].min() + gap / 2, a[:, 1].max(), gap)
-    if len(rows) * len(a) > MOST_CROSSED:
-        return
-    for y in rows:
+    for y in np.arange(a[:, 1].min() + gap / 2, a[:, 1].max(), gap):
         still: list[list[tuple[float, float]]] = []
-        spans = _crossed(a, b, float(y), inset, even_odd)
-        if len(spans) > MOST_SPANS:
-            return
-        for ends in spans:
+        for ends in _crossed(a, b, float(y), inset, even_odd):
             line = next((o for o in open_lines if min(abs(o[-1][0] - x) for x in ends) < 2 * gap), None)
             if line is not None:
                 open_lines.remove(line)

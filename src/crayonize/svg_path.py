@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_SEGMENTS = 500_000
+MAX_SEGMENTS = 300_000
+MAX_POINTS = 1_000_000  # of one subpath
 STEP_MM = 0.6  # between the points of a curve
 MOST_POINTS = 400  # of one curve
 
@@ -28,6 +29,7 @@ class Outline:
     def __init__(self, start: tuple[float, float]) -> None:
         self.ends: Points = [start]
         self.inner: list[tuple[float, float, float, float]] = [_STRAIGHT]
+        self.curved = False
 
     def line(self, x: float, y: float) -> None:
         self.ends.append((x, y))
@@ -36,27 +38,34 @@ class Outline:
     def cubic(self, x1: float, y1: float, x2: float, y2: float, x: float, y: float) -> None:
         self.ends.append((x, y))
         self.inner.append((x1, y1, x2, y2))
+        self.curved = True
 
     def polyline(self, matrix: Floats) -> Floats:
         """The subpath under a transform to mm (3, 3) as points (n, 2), dense where it is curved."""
         turn, shift = matrix[:2, :2].T, matrix[:2, 2]
         with np.errstate(over="ignore", invalid="ignore"):
-            ends = np.array(self.ends) @ turn + shift
-            inner = np.array(self.inner).reshape(-1, 2, 2) @ turn + shift
-            control = np.stack([np.roll(ends, 1, 0), inner[:, 0], inner[:, 1], ends], 1)
-            length = np.hypot(*np.diff(control, axis=1).transpose(2, 0, 1)).sum(1)
-        curved = ~np.isnan(np.array(self.inner)[:, 0])
-        number = np.where(curved, np.clip(np.nan_to_num(length / STEP_MM, posinf=4), 4, MOST_POINTS), 1).astype(int)
-        which = np.repeat(np.arange(len(ends)), number)
-        step = np.arange(len(which)) - np.repeat(np.cumsum(number) - number, number) + 1
-        t = (step / number[which])[:, None]
-        p, u = control[which], 1 - t
-        with np.errstate(invalid="ignore", over="ignore"):
-            curve = u**3 * p[:, 0] + 3 * u * u * t * p[:, 1] + 3 * u * t * t * p[:, 2] + t**3 * p[:, 3]
-        points = np.where(curved[which][:, None], curve, p[:, 3])
-        keep = np.ones(len(points), bool)
-        keep[1:] = (np.abs(np.diff(points, axis=0)) > 1e-9).any(1)
+            points = np.array(self.ends) @ turn + shift
+            if self.curved:
+                points = _curves(points, np.array(self.inner).reshape(-1, 2, 2) @ turn + shift)
+            keep = np.ones(len(points), bool)
+            keep[1:] = (np.abs(np.diff(points, axis=0)) > 1e-9).any(1)
         return np.asarray(points[keep])
+
+
+def _curves(ends: Floats, inner: Floats) -> Floats:
+    """Points along straight and curved segments; `ends` (n, 2) and `inner` (n, 2, 2) as in Outline."""
+    control = np.stack([np.roll(ends, 1, 0), inner[:, 0], inner[:, 1], ends], 1)
+    length = np.hypot(*np.diff(control, axis=1).transpose(2, 0, 1)).sum(1)
+    curved = ~np.isnan(inner[:, 0, 0])
+    number = np.where(curved, np.clip(np.nan_to_num(length / STEP_MM, posinf=4), 4, MOST_POINTS), 1).astype(int)
+    if number.sum() > MAX_POINTS:
+        raise ValueError(f"a curve of more than {MAX_POINTS:,} points")
+    which = np.repeat(np.arange(len(ends)), number)
+    step = np.arange(len(which)) - np.repeat(np.cumsum(number) - number, number) + 1
+    t = (step / number[which])[:, None]
+    p, u = control[which], 1 - t
+    curve = u**3 * p[:, 0] + 3 * u * u * t * p[:, 1] + 3 * u * t * t * p[:, 2] + t**3 * p[:, 3]
+    return np.where(curved[which][:, None], curve, p[:, 3])
 
 
 _STRAIGHT = (math.nan,) * 4

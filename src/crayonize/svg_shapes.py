@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .svg_path import Outline, outlines
-from .svg_xml import MAX_DEPTH, MAX_ELEMENTS, Element, declarations, style_rules
+from .svg_xml import MAX_DEPTH, Element, declarations, style_rules
 
 MAX_POINTS = 1_000_000
+MAX_LINES = 50_000
+MAX_USES = 10_000
 MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 PX_MM = 25.4 / 96
 PX_PER = {unit: mm / PX_MM for unit, mm in MM.items()} | {"": 1.0, "px": 1.0}
@@ -31,6 +33,7 @@ _GROUPS = ("g", "a", "switch", "svg", "symbol", "use")
 _SHAPES = ("path", "line", "polyline", "polygon", "rect", "circle", "ellipse")
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s?([a-zA-Z%]*)")
 _CALL = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
+_TAKES = {"matrix": (6,), "translate": (1, 2), "scale": (1, 2), "rotate": (1, 3), "skewX": (1,), "skewY": (1,)}
 _RGB = re.compile(r"rgba?\(\s*([0-9.]+%?(?:[\s,/]+[0-9.]+%?){2,3})\s*\)")
 _PART = re.compile(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)(%?)")
 
@@ -154,7 +157,7 @@ class _Walk:
         self.ids: dict[str, Element] = {}
         self.shapes: list[Shape] = []
         self.left_out: dict[str, int] = {}
-        self.visited = self.points = 0
+        self.used = self.points = self.lines = 0
         self._outlines: dict[int, list[Outline]] = {}
         self._name(root)
         style = self._style(root, {"fill": "black", "stroke": "none", "stroke-width": "1", "color": "black"})
@@ -171,9 +174,6 @@ class _Walk:
                 self.ids[element.attributes["id"]] = element
 
     def _visit(self, element: Element, matrix: Floats, above: Mapping[str, str], opacity: float, depth: int) -> None:
-        self.visited += 1
-        if self.visited > MAX_ELEMENTS:
-            raise ValueError(f"more than {MAX_ELEMENTS:,} elements once every <use> is followed")
         if depth > MAX_DEPTH:
             raise ValueError(f"nested deeper than {MAX_DEPTH} elements, or a <use> that leads back to itself")
         if element.tag in ("text", "image", "foreignObject"):
@@ -189,6 +189,9 @@ class _Walk:
             if style.get("visibility") not in ("hidden", "collapse"):
                 self._add(element, matrix, style, opacity)
         elif element.tag == "use":
+            self.used += 1
+            if self.used > MAX_USES:
+                raise ValueError(f"more than {MAX_USES:,} <use> to follow")
             x, y = (_length(element.attributes.get(axis, "0")) for axis in "xy")
             target = self.ids.get(element.attributes.get("href", "")[1:])
             if target is not None:
@@ -219,7 +222,11 @@ class _Walk:
                 return
         if not math.isfinite(width):
             raise ValueError(f"<{element.tag}> has a stroke-width beyond all bounds")
-        lines = [outline.polyline(matrix) for outline in self._outline(element)]
+        outline = self._outline(element)
+        self.lines += len(outline)
+        if self.lines > MAX_LINES:
+            raise ValueError(f"more than {MAX_LINES:,} lines")
+        lines = [part.polyline(matrix) for part in outline]
         self.points += sum(map(len, lines))
         if self.points > MAX_POINTS:
             raise ValueError(f"more than {MAX_POINTS:,} points")
@@ -309,8 +316,10 @@ def transform(text: str) -> Floats:
 
 
 def _call(name: str, *v: float) -> Floats:
+    if len(v) not in _TAKES[name]:
+        raise TypeError
     if name == "matrix":
-        a, b, c, d, e, f = v if len(v) == 6 else (None,) * 6
+        a, b, c, d, e, f = v
         return np.array([[a, c, e], [b, d, f], [0, 0, 1]], np.float64)
     if name == "translate":
         return _moved(*(*v, 0.0)[:2])

@@ -39,6 +39,7 @@ class Physics:
     beta: float  # directional smear factor
     lam: float  # N per um of overlap and mm^2 of contact: .0005 a cell of 0.1 mm
     epsilon_um: float  # accuracy of the force, as a sum of overlaps over cells
+    firm: float  # share of the wax's height that holds the crayon up; the rest yields to it (Fig. 4 has all hold: 1)
     heap: float  # share of a cell's wax that counts as out of reach: Fig. 6 rubs on the paper alone (1)
     wear: float  # share of a cell's loss that deepens the cell itself; the rest the whole tip shares
 
@@ -47,7 +48,7 @@ class Physics:
         relief, nu = self.relief / (1000 * cell_mm), 1 - (1 - self.nu) ** (cell_mm / self.nu_mm)
         values = (self.mu_paper, self.mu_wax, self.film_um, self.rate_per_mm * cell_mm, self.push, relief,
                   nu, self.alpha, self.beta, self.epsilon_um, self.wear, THIN_UM,
-                  self.heap)  # fmt: skip
+                  self.heap, self.firm)  # fmt: skip
         return np.array(values, np.float32)
 
 
@@ -264,9 +265,9 @@ def _deposit(contacts, touch, over, surface, side, home, cols, vx, vy, push, rat
              relief, wear, heap, inflow, mask, total):  # fmt: skip
     """Rub wax off the tip by friction (Eq. 3, Fig. 6).
 
-    The share of the overlap that breaks off (less `heap` of the wax already there) is rate * mu * sin(S, F), where S is the surface ahead and
-    F the crayon's force; faces steeper than F get none. What breaks off gathers in `inflow`, deepens the
-    mask by `wear` of it, and is returned as the tip's loss: wax is neither made nor lost.
+    The share of the overlap that breaks off (less `heap` of the wax already there) is rate * mu * sin(S, F),
+    where S is the surface ahead and F the crayon's force; faces steeper than F get none. What breaks off
+    gathers in `inflow`, deepens the mask by `wear` of it, and is returned as the tip's loss.
     """
     longest = max(abs(vx), abs(vy))
     ax, ay = vx / longest, vy / longest  # one cell ahead along the longer axis
@@ -296,7 +297,7 @@ def _deposit(contacts, touch, over, surface, side, home, cols, vx, vy, push, rat
 
 
 @kernel
-def _look(mask, side, top, left, rows, cols, paper, total, surface, gap):  # type: ignore[no-untyped-def]
+def _look(mask, side, top, left, rows, cols, firm, paper, total, surface, gap):  # type: ignore[no-untyped-def]
     """Surface under the window of the tip and its gap to the mask; off the sheet nothing touches."""
     inside = 0
     for j in range(side):
@@ -305,7 +306,7 @@ def _look(mask, side, top, left, rows, cols, paper, total, surface, gap):  # typ
             at = j * side + i
             x = left + i
             if 0 <= y < rows and 0 <= x < cols:
-                surface[at] = paper[y * cols + x] + total[y * cols + x]
+                surface[at] = paper[y * cols + x] + firm * total[y * cols + x]
                 gap[at] = surface[at] - mask[at]
                 inside += mask[at] < np.float32(1e8)
             else:
@@ -332,7 +333,7 @@ def _rub(picked, points, first, wax_of, mask_of, masks, sides, step_cells, smear
     mu_paper, mu_wax, film, rate_cell = constants[0], constants[1], constants[2], constants[3]
     push, relief, nu_cell, alpha = constants[4], constants[5], constants[6], constants[7]
     beta, epsilon, wear, thin = constants[8], constants[9], constants[10], constants[11]
-    heap = constants[12]
+    heap, firm = constants[12], constants[13]
     for s in picked:
         tip, wax = mask_of[s], wax_of[s]
         side = sides[tip]
@@ -376,7 +377,7 @@ def _rub(picked, points, first, wax_of, mask_of, masks, sides, step_cells, smear
             left = int(np.floor(x - 0.5 + dither_x)) - side // 2
             top = int(np.floor(y - 0.5 + dither_y)) - side // 2
             dither_x, dither_y = (dither_x + 0.7548776662) % 1.0, (dither_y + 0.5698402910) % 1.0
-            inside = _look(mask, side, top, left, rows, cols, paper, total, surface, gap)
+            inside = _look(mask, side, top, left, rows, cols, firm, paper, total, surface, gap)
             if inside == 0:
                 continue
             wanted = force * per_lambda * np.float32(inside) / np.float32(present)

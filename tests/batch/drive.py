@@ -9,14 +9,16 @@ from crayonize.settings import Settings
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("inputs", nargs="+")
-    parser.add_argument("-o", "--output", required=True)
     parser.add_argument("-q", "--quiet", action="store_true")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--metadata", default="safe")
     parser.add_argument("--memory", type=int)
     parser.add_argument("--render", default="stand_in:sketch")
     batch.add_options(parser)
     words = parser.parse_args()
-    recipe = batch.Recipe(Settings(size=64, seed=words.seed), max_pixels=words.max_pixels, max_bytes=words.max_bytes)
+    recipe = batch.Recipe(
+        Settings(size=64, seed=words.seed), metadata=words.metadata, max_pixels=words.max_pixels, max_bytes=words.max_bytes
+    )
     try:
         sys.exit(batch.run(words.inputs, words.output, batch.options_of(words), recipe,
                            render=words.render, memory_limit=words.memory))  # fmt: skip

@@ -1,0 +1,3 @@
+"""Stands in the way of the package that reads HEIC."""
+
+raise ImportError("hidden for a test")
