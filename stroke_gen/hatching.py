@@ -31,9 +31,9 @@ class Hatch:
 
 
 @kernel
-def _free(stamp, x, y, fine):  # type: ignore[no-untyped-def]
+def _free(stamp, x, y, fine, below):  # type: ignore[no-untyped-def]
     j, i = int(y * fine), int(x * fine)
-    return 0 <= j < stamp.shape[0] and 0 <= i < stamp.shape[1] and stamp[j, i] == 0
+    return 0 <= j < stamp.shape[0] and 0 <= i < stamp.shape[1] and stamp[j, i] < below
 
 
 @kernel
@@ -53,7 +53,7 @@ def _leg(x, y, dx, dy, want, tangent, stamp, fine, step, reach, gap, sharpest, o
         norm = np.sqrt(tx * tx + ty * ty)
         dx, dy = tx / norm, ty / norm
         x, y = x + step * dx, y + step * dy
-        if not (0 <= x < w and 0 <= y < h) or not _free(stamp, x, y, fine):
+        if not (0 <= x < w and 0 <= y < h) or not _free(stamp, x, y, fine, 2):
             break
         walked += step
         out[n, 0], out[n, 1] = x, y
@@ -68,15 +68,21 @@ def _leg(x, y, dx, dy, want, tangent, stamp, fine, step, reach, gap, sharpest, o
 
 
 @kernel
-def _press(stamp, path, n, radius, fine):  # type: ignore[no-untyped-def]
-    """Stamp discs of `radius` along a path, so that no other line comes nearer."""
-    r = radius * fine
-    k = int(r) + 1
+def _press(stamp, path, n, spacing, fine):  # type: ignore[no-untyped-def]
+    """Stamp discs along a path: 2 where no other line may come, 1 where none may begin.
+
+    Without the second, lines would be squeezed in half-way between two that lie just right.
+    """
+    inner, outer = spacing * fine * np.float32(0.46), spacing * fine * np.float32(0.75)
+    k = int(outer) + 1
     for p in range(n):
         cx, cy = path[p, 0] * fine, path[p, 1] * fine
         for j in range(max(0, int(cy) - k), min(stamp.shape[0], int(cy) + k + 1)):
             for i in range(max(0, int(cx) - k), min(stamp.shape[1], int(cx) + k + 1)):
-                if (i + np.float32(0.5) - cx) ** 2 + (j + np.float32(0.5) - cy) ** 2 <= r * r:
+                apart = (i + np.float32(0.5) - cx) ** 2 + (j + np.float32(0.5) - cy) ** 2
+                if apart <= inner * inner:
+                    stamp[j, i] = 2
+                elif apart <= outer * outer and stamp[j, i] == 0:
                     stamp[j, i] = 1
 
 
@@ -91,7 +97,7 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
     sharpest = np.float32(0.75)
     for s in range(seeds.shape[0]):
         x, y = seeds[s, 0], seeds[s, 1]
-        if want[int(y), int(x)] <= 0 or not _free(stamp, x, y, fine):
+        if want[int(y), int(x)] <= 0 or not _free(stamp, x, y, fine, 1):
             continue
         if used + 4096 >= points.shape[0] or strokes + 2 >= first.shape[0]:
             break
@@ -127,7 +133,7 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
             for p in range(m):
                 points[used, 0], points[used, 1], leg_of[used] = back[p, 0], back[p, 1], leg
                 used += 1
-            _press(stamp, points[begin:used], used - begin, spacing * np.float32(0.46), fine)
+            _press(stamp, points[begin:used], used - begin, spacing, fine)
             # The next leg begins beside this end, or further back where the crayon is still wanted.
             ex, ey = points[used - 1, 0], points[used - 1, 1]
             q = max(begin, used - 2)
@@ -139,7 +145,7 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
             found = False
             for p in range(used - 1, max(begin, used - 1 - int(np.float32(3) * spacing / step)), -1):
                 nx, ny = points[p, 0] - side * ty * spacing, points[p, 1] + side * tx * spacing
-                if 0 <= nx < w and 0 <= ny < h and want[int(ny), int(nx)] > 0 and _free(stamp, nx, ny, fine):
+                if 0 <= nx < w and 0 <= ny < h and want[int(ny), int(nx)] > 0 and _free(stamp, nx, ny, fine, 2):
                     x, y, found = nx, ny, True
                     break
             side = -side  # the direction has turned about, the side on the sheet has not

@@ -136,6 +136,8 @@ def with_force(style: Style, force: str | float) -> Style:
 def with_age(style: Style, age: int) -> Style:
     """The style as drawn at an age from 3 to 10: the younger, the fatter the crayon, the fewer colours, the
     wider the gaps and the further beyond the border."""
+    if not style.lines_first:
+        raise ValueError("age: only a style that draws outlines first, as child does, has an age")
     if not 3 <= age <= 10:
         raise ValueError(f"age: {age} is not between 3 and 10")
     young = (10 - age) / 7

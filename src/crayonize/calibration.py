@@ -2,11 +2,13 @@
 
 Every crayon is hatched at six pressures over five grounds (bare paper, and coats of a middle and the
 darkest crayon); a line per channel through "before, after" gives `a` and `b` of the table. The tables of
-the shipped palettes on the default paper are part of the package; others are measured once and kept in
-the user's cache folder.
+the shipped palettes on the default paper are part of the package (`python -m crayonize.calibration` measures
+them anew); others are measured once and kept in the user's cache folder.
 """
 
 import hashlib
+import io
+import itertools
 import os
 from pathlib import Path
 
@@ -17,7 +19,8 @@ from stroke_gen.drawing import Stroke, Tip
 from stroke_gen.swatches import Swatches
 
 from . import cache, optics, paper, rub
-from .palette import Palette
+from .palette import Palette, load_palette, palette_names
+from .settings import Settings
 from .wax import Sheet
 
 PRESSURES = (0.04, 0.1, 0.2, 0.38, 0.62, 0.95)  # N/mm^2
@@ -25,6 +28,7 @@ TIP = Tip("blunt", 2.4)
 SPACING = 0.62  # of the tip's width
 PATCH_MM, EDGE_MM = 11.0, 2.5  # a swatch, and what is left out of the mean around it
 CELL_MM = 297 / 1600
+SHIPPED = Path(__file__).parent / "data" / "tables"
 
 
 def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
@@ -76,7 +80,7 @@ def _hatching(row: int, col: int, crayon: str, pressure: float, turn: int) -> St
     zigzag = np.stack([ends, np.repeat(lines, 2)], 1)
     angle = np.deg2rad(-50 + 25 * turn)
     turned = zigzag @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    fine = np.concatenate([np.linspace(p, q, 12) for p, q in zip(turned[:-1], turned[1:], strict=True)])
+    fine = np.concatenate([np.linspace(p, q, 12) for p, q in itertools.pairwise(turned)])
     inside = fine[(np.abs(fine) <= half - 0.6).all(1)]
     path = (inside + (np.array([col, row]) + 0.5) * PATCH_MM).astype(np.float32)
     force = np.full(len(path), pressure * 0.785 * TIP.width_mm**2, np.float32)
@@ -111,38 +115,46 @@ def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArr
 def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
     """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured now."""
     name = f"{palette.name}-{_key(palette, sheet_paper, physics)}.npz"
-    for folder in _folders():
-        if (folder / name).is_file():
-            return _load(folder / name)
-    table = measure(palette, sheet_paper, physics, threads)
-    _keep(table, _folders()[-1] / name)
-    return table
+    if (SHIPPED / name).is_file():
+        return _unpacked((SHIPPED / name).read_bytes())
+    kept = cache.folder() / name
+    content = cache.read(kept)
+    if content is None:
+        content = _packed(measure(palette, sheet_paper, physics, threads))
+        cache.write(kept, content)
+    return _unpacked(content)
 
 
 def _key(palette: Palette, sheet_paper: paper.Paper, physics: str) -> str:
     """Changes with whatever the measured colours depend on."""
-    what = repr((palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM))
+    what = repr((palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
     return hashlib.sha256(what.encode()).hexdigest()[:12]
 
 
-def _folders() -> list[Path]:
-    """Where tables may lie: in the package, then in the user's cache."""
-    return [Path(__file__).parent / "data" / "tables", cache.folder()]
+def _packed(table: Swatches) -> bytes:
+    content = io.BytesIO()
+    a, b, grain = (m.astype(np.float16) for m in (table.a, table.b, table.grain))
+    names = np.array(table.names)
+    np.savez(content, names=names, pressures=table.pressures, paper=table.paper, a=a, b=b, grain=grain)
+    return content.getvalue()
 
 
-def _load(path: Path) -> Swatches:
-    with np.load(path) as table:
+def _unpacked(content: bytes) -> Swatches:
+    with np.load(io.BytesIO(content)) as table:
         names = tuple(str(n) for n in table["names"])
-        return Swatches(names, *(table[f] for f in ("pressures", "a", "b", "grain", "paper")))
+        return Swatches(names, *(table[f].astype(np.float32) for f in ("pressures", "a", "b", "grain", "paper")))
 
 
-def _keep(table: Swatches, path: Path) -> None:
-    """Write a table whole or not at all; a cache that cannot be written is no error."""
-    part = path.with_suffix(f".{os.getpid()}.part")
-    try:
-        with open(part, "wb") as file:
-            np.savez(file, names=np.array(table.names), pressures=table.pressures, a=table.a, b=table.b,
-                     grain=table.grain, paper=table.paper)  # fmt: skip
-        os.replace(part, path)
-    except OSError:
-        part.unlink(missing_ok=True)
+def ship(folder: Path = SHIPPED) -> None:
+    """Measure the tables that the package ships: every palette on the default paper."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.npz"):
+        old.unlink()
+    for name, *_ in palette_names():
+        box, sheet_paper, physics = load_palette(name), paper.load_paper(str(Settings.paper)), Settings.physics
+        table = _packed(measure(box, sheet_paper, physics, os.cpu_count() or 1))
+        (folder / f"{name}-{_key(box, sheet_paper, physics)}.npz").write_bytes(table)
+
+
+if __name__ == "__main__":
+    ship()

@@ -275,8 +275,8 @@ def _convert_parser() -> _Parser:
     add("--style", default=Settings.style, help="of `crayonize styles`, or a .toml file (%(default)s)")
     add("--paper", default=Settings.paper, help="of `crayonize papers`, or a picture of one (%(default)s)")
     add("--force", default=Settings.force, help="light, normal, heavy or a factor, 0.1 to 5 (%(default)s)")
-    if "age" in [field.name for field in fields(Settings)]:
-        add("--age", type=_whole, help="of the one who draws in style child, 3 to 10")
+    add("--age", type=_whole, help="of the one who draws in style child, 3 to 10")
+    add("--left-handed", action="store_true", help="hatching leans the other way")
     add("--seed", type=_seed, default=Settings.seed, help="a whole number, or `random` (%(default)s)")
     add("--focus", type=_focus, action="append", default=[], metavar="X,Y,W,H",
         help="a part that deserves care, in fractions of the picture; may be repeated")  # fmt: skip

@@ -2,13 +2,13 @@
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen import params
+from stroke_gen.analysis import fit
 from stroke_gen.drawing import Drawing, Stroke
 from stroke_gen.generate import generate
 
@@ -87,6 +87,14 @@ def draw(
     return stand
 
 
+def _style(settings: Settings) -> params.Style:
+    """The style as this hand has it."""
+    style = params.with_force(params.load_style(settings.style), settings.force)
+    if settings.age is not None:
+        style = params.with_age(style, settings.age)
+    return replace(style, wrist_deg=-style.wrist_deg) if settings.left_handed else style
+
+
 def sketch(
     photo: NDArray[np.float32], settings: Settings, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Drawing, Easel]:
@@ -94,14 +102,14 @@ def sketch(
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = photo.shape[1] * scale, photo.shape[0] * scale
-    style = params.with_force(params.load_style(settings.style), settings.force)
+    style = _style(settings)
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
     stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
                   smears=not settings.preview)  # fmt: skip
     stand.watch = watch
     stand.draw([], share=0)  # whoever looks on sees the bare sheet
     table = calibration.swatches(stand.box.palette, paper.load_paper(settings.paper), settings.physics, stand.threads)
-    stages = len(style.passes) + 1
+    stages = len(style.passes) + 1 + style.lines_first
     done = 0
 
     def observe(strokes: list[Stroke], shape: tuple[int, int]) -> NDArray[np.float32]:
@@ -111,9 +119,11 @@ def sketch(
             name = strokes[0].note
             stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
         done += 1
-        return cv2.resize(stand.picture(light=False), shape[::-1], interpolation=cv2.INTER_AREA)
+        return fit(stand.picture(light=False), shape)
 
     strokes = generate(photo, width_mm, height_mm, table, style, settings.seed, observe=observe,
                        threads=stand.threads, focus=settings.focus)  # fmt: skip
-    drawing = Drawing(width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed)
+    drawing = Drawing(
+        width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed
+    )
     return drawing, stand

@@ -18,4 +18,6 @@ class Settings:
     physics: str = "metric"
     threads: int | None = None  # all cores
     preview: bool = False
+    age: int | None = None  # of the one who draws, 3 to 10, for style child
+    left_handed: bool = False  # hatching from upper left to lower right
     focus: tuple[tuple[float, float, float, float], ...] = ()  # boxes x, y, w, h in fractions of the picture

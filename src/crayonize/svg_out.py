@@ -67,7 +67,7 @@ def _lines(drawing: Drawing) -> Iterator[str]:
 def _path(stroke: Stroke) -> str:
     tip = f' data-tip="{stroke.tip.kind}"' if stroke.tip.kind != "blunt" else ""
     tip += f' data-angle="{stroke.tip.angle_deg:.4g}"' if stroke.tip.angle_deg else ""
-    note = f" data-note={quoteattr(stroke.note)}" if stroke.note != "fill" else ""
+    note = f" data-note={quoteattr(stroke.note)}"
     points = stroke.path_mm.astype(np.float64)
     if len(points) == 1:
         points = np.concatenate([points, points + (DAB_MM, 0)])

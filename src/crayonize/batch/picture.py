@@ -86,7 +86,8 @@ class Studio:
             if width * height > recipe.max_pixels:
                 raise ValueError(f"has {width * height} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
             settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, width, height)
-            needed = memory.need(str(picture.format), width * height, settings.size)
+            deep = ";16" in repr(picture.tile)
+            needed = memory.need(str(picture.format), width * height, settings.size, deep)
             return settings, metadata.kept(picture, recipe.metadata), needed
 
 
