@@ -39,7 +39,7 @@ def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) ->
     scene, box = plan.scene, plan.swatches.only(plan.recipes.crayons())
     if style.lines <= 0:
         return []
-    tip = Tip("sharp", style.line_tip * style.tip_mm)
+    tip = Tip("sharp", round(style.line_tip * style.tip_mm, 3))  # as the drawing's file rounds it
     width = tip.width_mm / scene.cell_mm
     budget = style.lines * BUDGET * max(scene.detail.shape)
     picked = []

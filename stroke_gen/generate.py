@@ -16,7 +16,7 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 AGREE = 0.45  # tips over which neighbours agree on a recipe
 RAGGED = 0.12  # of all votes: how raggedly one recipe gives way to the next
-FAR_SIGHT = 0.8  # how much a free coat makes up for colours that are off when seen from afar
+FAR_SIGHT = 1.3  # how much a free coat makes up for colours that are off when seen from afar
 Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
 
 
@@ -52,7 +52,7 @@ def generate(
 def _coat(plan: Plan, now: Floats, coat: Pass, style: Style, rng: np.random.Generator) -> list[Stroke]:
     """One coat: choose a crayon for every place, then hatch crayon by crayon, light to dark."""
     scene, box = plan.scene, plan.swatches
-    width = coat.tip * style.tip_mm
+    width = round(coat.tip * style.tip_mm, 3)  # as the drawing's file rounds it
     tip = Tip("sharp" if coat.sharp else "blunt", width)
     cells = width / scene.cell_mm
     seen = scene.target if coat.detail > 0 else scene.calm

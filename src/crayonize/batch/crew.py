@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from .job import Job, Outcome
 from .memory import SHARE
@@ -37,6 +37,19 @@ Message = dict[str, Any]
 
 class CrewError(Exception):
     """No work is possible: workers do not come up, or no picture can be written."""
+
+
+class Workers(Protocol):
+    """Who does the jobs: a crew of processes here, or a cluster."""
+
+    def work(self, jobs: Iterator[Job | None]) -> Iterator[tuple[Job, Outcome]]:
+        """Do the jobs and give what became of each."""
+
+    def stop(self, now: bool = False) -> None:
+        """End soon, or now."""
+
+    def close(self) -> None:
+        """Send all home."""
 
 
 @dataclass(eq=False)

@@ -31,19 +31,35 @@ class OutputFolder:
 
     def journal(self) -> Journal:
         """The journals of all runs and shards; we add to our own."""
-        own = self._state / (f"journal-{self._shard}.jsonl" if self._shard else "journal.jsonl")
+        own = self._own_journal()
         others = (file for file in sorted(self._state.glob("journal*.jsonl")) if file != own)
         return Journal(own, others, self._recipe)
 
-    def sweep(self, folders: Iterable[str]) -> None:
+    def _own_journal(self) -> Path:
+        return self._state / (f"journal-{self._shard}.jsonl" if self._shard else "journal.jsonl")
+
+    def size(self, job: Job) -> int | None:
+        """Bytes of what stands at a job's target, None if there is nothing."""
+        try:
+            return os.lstat(job.target).st_size
+        except OSError:
+            return None
+
+    def sweep(self, jobs: Iterable[Job]) -> None:
         """Remove what killed runs left behind; while other shards may be at work, only what is old."""
         before = time.time() - _STALE if self._shard else None
-        for folder in folders:
+        for folder in {os.path.dirname(job.target) for job in jobs}:
             _remove_parts(folder, ".crayonize-", before)
 
     def clean_up(self, job: Job, pid: int) -> None:
         """Remove what a worker left behind that was killed at a job."""
         _remove_parts(os.path.dirname(job.target), f".crayonize-{pid}-", None)
+
+    def noted(self) -> None:
+        """A line was added to the journal."""
+
+    def close(self) -> None:
+        """The work is done."""
 
 
 def _remove_parts(folder: str, start: str, before: float | None) -> None:

@@ -15,6 +15,7 @@ from ..image_write import read_settings, same_file
 from ..settings import Settings
 from . import memory
 from .job import Job, Outcome, Recipe
+from .remote import SendError, local_copy
 
 Ask = Callable[[int], bool]  # wait until so many bytes of memory are free; False if they never will be
 
@@ -47,24 +48,31 @@ class Studio:
             return Outcome("failed", "there is not enough memory for it; choose a smaller --size or fewer --jobs")
         except OutputError:
             raise
+        except SendError as error:
+            raise OutputError(str(error)) from error
         except OSError as error:
             return Outcome("failed", f"cannot be read ({error.strerror or error})")
         except Exception as error:  # one photo is never worth the others
             return Outcome("failed", f"this should not have happened ({type(error).__name__}: {error})")
 
     def _make(self, job: Job, ask: Ask) -> Outcome:
-        recipe, source, target = self._recipe, job.photo.source, Path(job.target)
+        if job.photo.size > self._recipe.max_bytes:
+            raise ValueError(f"has {job.photo.size} bytes; the limit is {self._recipe.max_bytes} (--max-bytes)")
+        with local_copy(job) as (source, target):
+            return self._draw(job, source, target, ask)
+
+    def _draw(self, job: Job, source: str, target: Path, ask: Ask) -> Outcome:
         settings, kept, needed = self._look_at(source)
         if not ask(needed):
             raise ValueError(f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first")
         if same_file(source, target):
             raise ValueError("its picture would take its own place; choose another output folder")
         if job.strange and not _is_ours(target):
-            raise ValueError(f"at {job.out!r} stands something that was not made here; --existing skip or overwrite")
+            raise ValueError(f"at {job.out!r} stands something that was not made here; see --existing")
         drawing, easel = self._sketch(source, settings)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            api.finish(drawing, easel, target, light=recipe.light, settings=settings, kept=kept)
+            api.finish(drawing, easel, target, light=self._recipe.light, settings=settings, kept=kept)
             _keep_name(target.parent)
         except OSError as error:
             if error.errno == errno.ENAMETOOLONG:
@@ -78,9 +86,6 @@ class Studio:
         ValueError for a photo beyond the limits.
         """
         recipe = self._recipe
-        size = Path(source).stat().st_size
-        if size > recipe.max_bytes:
-            raise ValueError(f"has {size} bytes; the limit is {recipe.max_bytes} (--max-bytes)")
         with open_picture(source) as (picture, _):
             width, height = picture.size
             if width * height > recipe.max_pixels:

@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from . import remote
 from .job import Found, Job, Outcome
 from .names import Places, clashes_text, folded, picture_name
+from .remote import is_remote
 from .scan import Entry, found, scan
 
 
@@ -71,11 +73,11 @@ def sources(inputs: Sequence[str]) -> list[str]:
     """
     paths: dict[str, str] = {}
     for given in inputs:
-        matches = [given] if os.path.lexists(given) else sorted(glob.glob(given))
+        matches = [given] if is_remote(given) or os.path.lexists(given) else sorted(glob.glob(given))
         if not matches:
             raise ValueError(f"{given!r}: there is no such file or folder")
         for path in matches:
-            paths.setdefault(_full(path), path)
+            paths.setdefault(path if is_remote(path) else _full(path), path)
     return list(paths.values())
 
 
@@ -83,11 +85,11 @@ def entries(paths: Sequence[str]) -> Iterator[Entry]:
     """All entries of the sources. One folder is mirrored itself; one among several under its own name."""
     for path in paths:
         own_name = os.path.basename(_full(path))
-        if not os.path.isdir(path):
+        if not (is_remote(path) or os.path.isdir(path)):
             yield _named_file(path, own_name)
             continue
         prefix = "" if len(paths) == 1 else f"{own_name}/"
-        for entry in scan(path):
+        for entry in remote.scan(path) if is_remote(path) else scan(path):
             if isinstance(entry, Found):
                 yield replace(entry, name=prefix + entry.name, place=prefix + entry.place)
             else:
@@ -114,6 +116,10 @@ def _named_file(path: str, place: str) -> Entry:
 
 def check_apart(paths: Sequence[str], output: str, jobs: Sequence[Job]) -> None:
     """ValueError if pictures would land among the photos, by whatever links, or in the place of one."""
+    if is_remote(output):
+        _check_urls_apart(paths, output)
+        return
+    paths = [path for path in paths if not is_remote(path)]
     folders = [path for path in paths if os.path.isdir(path)]
     files = [path for path in paths if path not in folders]
     photos = {folded(os.path.realpath(path)) for path in files} | {folded(_place(path)) for path in files}
@@ -129,6 +135,12 @@ def check_apart(paths: Sequence[str], output: str, jobs: Sequence[Job]) -> None:
         place = os.path.join(places[os.path.dirname(job.target)], os.path.basename(job.target))
         if folded(place) in photos:
             raise ValueError(f"the picture of {job.photo.name!r} would be written over a photo, {place!r}")
+
+
+def _check_urls_apart(paths: Sequence[str], output: str) -> None:
+    for path in paths:
+        if is_remote(path) and remote.lie_in_one_another(path, output):
+            raise ValueError(f"{output!r} and {path!r} lie in one another; photos and pictures need two folders")
 
 
 def _lies_in(inner: str, outer: str) -> bool:

@@ -11,10 +11,11 @@ import os
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ..did_you_mean import printable
-from .job import STATUSES, Outcome
+from .job import STATUSES, Job, Outcome
 
 _BAD = ("failed", "died", "timeout")
 _EVERY = 0.1  # s between two states of the bar
@@ -32,11 +33,37 @@ class Report:
         self._json, self._quiet = as_json, quiet
         self.counts = Counter(dict.fromkeys(STATUSES, 0))
         self._begun = time.monotonic()
+        self._left: dict[Job, None] = {}
         self._bar = _Bar(shown=not quiet)
 
-    def expect(self, jobs: int) -> None:
-        """So many jobs are going to be done."""
-        self._bar.total += jobs
+    def expect(self, jobs: Iterable[Job]) -> None:
+        """These jobs are going to be done."""
+        self._left |= dict.fromkeys(jobs)
+        self._bar.total = len(self._left)
+
+    def expecting(self, jobs: Iterator[Job | None]) -> Iterator[Job | None]:
+        """The same jobs, those expected that nobody knew before."""
+        for job in jobs:
+            if job is not None and job not in self._left:
+                self._left[job] = None
+                self._bar.total += 1
+            yield job
+
+    def done(self, job: Job, outcome: Outcome) -> None:
+        """Tell what became of a job."""
+        del self._left[job]
+        self.file(job.photo.name, outcome, job.out)
+        self._bar.step(outcome.status != "ok")
+
+    def not_run(self) -> None:
+        """Tell of the jobs that were not done."""
+        for job in self._left:
+            self.file(job.photo.name, Outcome("not_run"), job.out)
+
+    def others(self, others: Iterable[tuple[str, Outcome]]) -> None:
+        """Tell of the files that are no jobs."""
+        for name, outcome in others:
+            self.file(name, outcome)
 
     def file(self, name: str, outcome: Outcome, out: str | None = None) -> None:
         """Tell of one file. ReportError if that is not possible."""
@@ -57,10 +84,6 @@ class Report:
     def bad(self) -> int:
         """How many files could not be drawn."""
         return sum(self.counts[status] for status in _BAD)
-
-    def moved(self, failed: bool) -> None:
-        """Let the bar show that one more job is done."""
-        self._bar.step(failed)
 
     def say(self, text: str, always: bool = True) -> None:
         """A line for people; if not `always`, not with --quiet."""

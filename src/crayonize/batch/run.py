@@ -1,6 +1,5 @@
 """The conductor of a batch: plan, lock, draw, account."""
 
-import os
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -10,14 +9,17 @@ from types import FrameType
 from typing import Any
 
 from . import lock, memory
-from .crew import Crew, CrewError
+from .crew import Crew, CrewError, Workers
+from .existing import Existing
 from .job import Job, Outcome, Recipe
 from .journal import Journal
 from .names import check_template
 from .options import Options
 from .output import OutputFolder
 from .plan import Plan, Planner, check_apart, entries, sources
+from .remote import RemoteFolder, SendError, is_remote
 from .report import Report, ReportError
+from .watch import Watch
 
 
 def run(inputs: Sequence[str], output: str, options: Options, recipe: Recipe, *,
@@ -36,12 +38,24 @@ def run(inputs: Sequence[str], output: str, options: Options, recipe: Recipe, *,
     plan = planner.plan(entries(paths))
     check_apart(paths, output, plan.jobs)
     report = Report(options.json, options.quiet)
-    folder = OutputFolder(output, options.shard, recipe.digest(options.format))
+    make_folder = RemoteFolder if is_remote(output) else OutputFolder
+    folder = make_folder(output, options.shard, recipe.digest(options.format))
     if options.dry_run:
-        return _tell(plan, folder.journal(), options.existing, report)
+        existing = Existing(options.existing, folder.journal(), folder.size)
+        return _tell(plan, existing.settle_all(plan), report)
     try:
         with folder.held():
-            return _draw(plan, folder, options, recipe, report, render, memory_limit)
+            existing = Existing(options.existing, folder.journal(), folder.size)
+            to_do = existing.settle_all(plan)
+            folder.sweep(plan.jobs)
+            crew = _crew(options, recipe, folder, len(to_do), render, memory_limit)
+            jobs: Iterator[Job | None] = iter(to_do)
+            if options.watch:
+                done = {job.photo for job in plan.jobs} - {job.photo for job in to_do}
+                jobs = Watch(lambda: entries(paths), planner, existing, report.file).jobs(done)
+            else:
+                report.expect(to_do)
+            return _draw(crew, jobs, plan, folder, existing.journal, report)
     except ReportError as error:
         report.say(f"stopped: the report cannot be written ({error})")
         return 1
@@ -56,10 +70,9 @@ def _fields(recipe: Recipe) -> dict[str, str]:
     return {field: Path(str(settings[field])).stem for field in ("palette", "paper", "style", "seed")}
 
 
-def _tell(plan: Plan, journal: Journal, existing: str, report: Report) -> int:
+def _tell(plan: Plan, to_do: Sequence[Job], report: Report) -> int:
     """What would be done."""
-    to_do = _settle(plan, journal, existing)
-    _report_others(plan, report)
+    report.others(plan.others)
     for job in to_do:
         report.file(job.photo.name, Outcome("not_run"), job.out)
         report.say(f"{job.photo.name} -> {job.target}", always=False)
@@ -67,66 +80,28 @@ def _tell(plan: Plan, journal: Journal, existing: str, report: Report) -> int:
     return 0
 
 
-def _settle(plan: Plan, journal: Journal, existing: str) -> list[Job]:
-    """Sort out what need not be drawn; ValueError if pictures are there that must not be."""
-    to_do, there = [], []
-    for job in plan.jobs:
-        size = _size(job.target)
-        if size is None or existing == "overwrite":
-            to_do.append(job)
-        elif existing == "skip" or (existing == "auto" and journal.is_done(job, size)):
-            plan.others.append((job.photo.name, Outcome("skipped", "is there already")))
-        elif existing == "fail":
-            there.append(job.out)
-        else:
-            to_do.append(replace(job, strange=not journal.knows(job.out)))
-    if there:
-        raise ValueError(f"{len(there)} pictures are there already, such as {there[0]!r}; see --existing")
-    return to_do
-
-
-def _size(path: str) -> int | None:
-    """Bytes of what stands at a path, None if there is nothing."""
-    try:
-        return os.lstat(path).st_size
-    except OSError:
-        return None
-
-
-def _report_others(plan: Plan, report: Report) -> None:
-    for name, outcome in plan.others:
-        report.file(name, outcome)
-
-
-def _draw(plan: Plan, folder: OutputFolder, options: Options, recipe: Recipe, report: Report,
-          render: str | None, memory_limit: int | None) -> int:  # fmt: skip
+def _draw(crew: Workers, jobs: Iterator[Job | None], plan: Plan, folder: OutputFolder, journal: Journal,
+          report: Report) -> int:  # fmt: skip
     """Draw what is to be drawn, and account for every file."""
-    journal = folder.journal()
-    to_do = _settle(plan, journal, options.existing)
-    folder.sweep({os.path.dirname(job.target) for job in plan.jobs})
-    left = dict.fromkeys(to_do)
-    report.expect(len(to_do))
-    crew = _crew(options, recipe, folder, len(to_do), render, memory_limit)
     code, reason = 0, ""
     try:
         with _stopped_by_signals(crew) as signals:
-            _report_others(plan, report)
-            for job, outcome in crew.work(iter(to_do)):
+            report.others(plan.others)
+            for job, outcome in crew.work(report.expecting(jobs)):
                 if outcome.status == "ok":
                     journal.add(job, outcome.bytes)
-                del left[job]
-                report.file(job.photo.name, outcome, job.out)
-                report.moved(failed=outcome.status != "ok")
+                    folder.noted()
+                report.done(job, outcome)
         if signals:
             code, reason = 128 + signals[0], signal.Signals(signals[0]).name
+        folder.close()
     except ValueError as error:
         code, reason = 2, str(error)
-    except (CrewError, OSError) as error:
+    except (CrewError, SendError, OSError) as error:
         code, reason = 1, str(error)
     finally:
         crew.close()
-    for job in left:
-        report.file(job.photo.name, Outcome("not_run"), job.out)
+    report.not_run()
     code = code or (3 if report.bad else 0)
     report.end(code, reason, plan.elsewhere)
     return code
@@ -146,7 +121,7 @@ def _crew(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
 
 
 @contextmanager
-def _stopped_by_signals(crew: Crew) -> Iterator[list[int]]:
+def _stopped_by_signals(crew: Workers) -> Iterator[list[int]]:
     """Let the first signal end the work soon and the second at once; yields the signals that came."""
     came: list[int] = []
 

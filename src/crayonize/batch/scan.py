@@ -33,21 +33,21 @@ def scan(root: str) -> Iterator[Entry]:
         deeper = []
         for entry in entries:
             name = f"{inside}/{entry.name}" if inside else entry.name
-            if entry.is_dir(follow_symlinks=False) and not _skipped(entry.name):
+            if entry.is_dir(follow_symlinks=False) and not ignored_name(entry.name):
                 deeper.append(name)
             else:
                 yield _look(entry, name)
         folders += reversed(deeper)
 
 
-def _skipped(name: str) -> bool:
-    """Whether a file or folder is hidden or the system's own."""
+def ignored_name(name: str) -> bool:
+    """Whether a name is that of a hidden file or folder, or of one of the system's own."""
     return name.startswith((".", "~$")) or name.lower() in _SYSTEM
 
 
 def _look(entry: os.DirEntry[str], name: str) -> Entry:
     """What one entry that is no open folder turns out to be."""
-    if _skipped(entry.name):
+    if ignored_name(entry.name):
         return name, Outcome("ignored", "hidden or a system file")
     try:
         status = entry.stat(follow_symlinks=False)
