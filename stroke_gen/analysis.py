@@ -100,7 +100,7 @@ def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tupl
     c = total[..., 0] + prior * np.float32(np.cos(2 * wrist_rad))
     s = total[..., 1] + prior * np.float32(np.sin(2 * wrist_rad))
     angle = 0.5 * np.arctan2(s, c)
-    trust = strength / (strength + prior)
+    trust = strength / (strength + prior + np.float32(1e-12))
     return np.dstack([np.cos(angle), np.sin(angle)]).astype(np.float32), (coherence * trust).astype(np.float32)
 
 

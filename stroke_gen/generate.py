@@ -32,6 +32,7 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     scene = analysis.read(photo, width_mm, height_mm, swatches, style, focus)
     mixes = recipes.find(oklab(scene.calm), swatches, style.recipes, style.crayons, rng)
+    swatches, mixes = swatches.only(mixes.crayons()), mixes.alone()
     tip = style.tip_mm / scene.cell_mm
     ragged = RAGGED * separation.streaks(scene.detail.shape, tip, style.wrist_deg, rng)
     group = separation.grouped(oklab(scene.calm), mixes, AGREE * tip, ragged)

@@ -49,7 +49,7 @@ class Style:
     crayons: Annotated[int, 1, 64] = 16  # most crayons taken out of the box
     recipes: Annotated[int, 1, 100] = 30  # kinds of colour told apart
     chroma: Annotated[float, 0, 3] = 1.0  # colourfulness asked for
-    lift: Annotated[float, 0, 0.3] = 0.0  # middle tones drawn lighter than they are, as paper is lighter than a photo
+    lift: Annotated[float, 0, 0.25] = 0.0  # middle tones drawn lighter than they are, as paper is lighter than a photo
     skin: Annotated[float, 0, 3] = 0.45  # more colour for pale warm tones, so that skin stays skin
     wrist_deg: Annotated[float, -90, 90] = -50.0  # the hand's own direction; -50 runs from lower left to upper right
     wrist: Annotated[float, 0, 100] = 0.3  # how much the wrist counts against the form

@@ -39,6 +39,11 @@ class Recipes:
         """All crayons in use, by their place in the box."""
         return sorted({int(k) for k in np.concatenate([self.base, self.shade, self.rival])})
 
+    def alone(self) -> "Recipes":
+        """The same for a box that holds no crayons but these."""
+        used = self.crayons()
+        return Recipes(self.centres, *(np.searchsorted(used, k) for k in (self.base, self.shade, self.rival)))
+
 
 _cube_root = kernel(cube_root)
 

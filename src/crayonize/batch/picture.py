@@ -91,7 +91,7 @@ class Studio:
             if width * height > recipe.max_pixels:
                 raise ValueError(f"has {width * height} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
             settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, width, height)
-            deep = ";16" in repr(picture.tile)
+            deep = ";16" in repr(getattr(picture, "tile", ""))
             needed = memory.need(str(picture.format), width * height, settings.size, deep)
             return settings, metadata.kept(picture, recipe.metadata), needed
 

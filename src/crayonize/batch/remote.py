@@ -142,9 +142,8 @@ class RemoteFolder(OutputFolder):
         """Bytes of what stands at a target, by one listing for all."""
         if self._sizes is None:
             system, root = file_system(self._url)
-            self._sizes = {
-                system.unstrip_protocol(path): int(info["size"]) for path, info in system.find(root, detail=True).items()
-            }
+            found = system.find(root, detail=True).items()
+            self._sizes = {system.unstrip_protocol(path): int(info["size"]) for path, info in found}
         system, path = file_system(job.target)
         return self._sizes.get(system.unstrip_protocol(path))
 

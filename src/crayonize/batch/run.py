@@ -9,6 +9,7 @@ from types import FrameType
 from typing import Any
 
 from . import lock, memory
+from .cluster import Cluster
 from .crew import Crew, CrewError, Workers
 from .existing import Existing
 from .job import Job, Outcome, Recipe
@@ -48,7 +49,7 @@ def run(inputs: Sequence[str], output: str, options: Options, recipe: Recipe, *,
             existing = Existing(options.existing, folder.journal(), folder.size)
             to_do = existing.settle_all(plan)
             folder.sweep(plan.jobs)
-            crew = _crew(options, recipe, folder, len(to_do), render, memory_limit)
+            crew = _workers(options, recipe, folder, len(to_do), render, memory_limit)
             jobs: Iterator[Job | None] = iter(to_do)
             if options.watch:
                 done = {job.photo for job in plan.jobs} - {job.photo for job in to_do}
@@ -107,13 +108,15 @@ def _draw(crew: Workers, jobs: Iterator[Job | None], plan: Plan, folder: OutputF
     return code
 
 
-def _crew(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
-          render: str | None, memory_limit: int | None) -> Crew:  # fmt: skip
-    """As many workers as are asked for, or as there are cores and memory; none of them idle."""
+def _workers(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
+             render: str | None, memory_limit: int | None) -> Workers:  # fmt: skip
+    """A cluster, or here as many workers as are asked for or as there are cores and memory; none of them idle."""
+    if options.dask:
+        return Cluster(options.dask, recipe, render, options.time_limit)
     available = memory.available_bytes() if memory_limit is None else memory_limit
     cores = memory.cores()
     size = options.jobs or min(cores, memory.workers(available, recipe.settings.size))
-    size = max(1, min(size, jobs))
+    size = size if options.watch else max(1, min(size, jobs))
     threads = recipe.settings.threads or max(1, cores // size)
     recipe = replace(recipe, settings=replace(recipe.settings, threads=threads))
     hello: dict[str, Any] = {"recipe": recipe.to_json(), "render": render, "memory": available}

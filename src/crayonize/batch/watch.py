@@ -53,9 +53,10 @@ class Watch:
 
     def _job(self, photo: Found) -> Iterator[Job]:
         job = self._planner.job(photo)
-        if job is None:
+        if isinstance(job, str):
+            self._tell(photo.name, Outcome("failed", f"{job!r} has the place of its picture"))
             return
-        settled = Outcome("failed", f"{job!r} has its place already") if isinstance(job, str) else self._existing.settle(job)
+        settled = self._existing.settle(job)
         if isinstance(settled, Job):
             yield settled
         else:

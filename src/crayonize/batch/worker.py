@@ -17,6 +17,7 @@ from typing import IO, Any
 from .job import Found, Job, Outcome, Recipe
 
 _PR_SET_PDEATHSIG = 1
+_IDLE = 3600.0  # s
 _BUFFERS = 512 << 20  # address space that threads and allocators reserve without using it
 
 Message = dict[str, Any]
@@ -46,8 +47,11 @@ class _Line:
         os._exit(0)
 
     def hear(self) -> Message:
-        """The next message."""
-        return self._messages.get()
+        """The next message; the end if there is none for long: on a cluster nobody may be left to send one."""
+        try:
+            return self._messages.get(timeout=_IDLE)
+        except queue.Empty:
+            os._exit(0)
 
     def say(self, message: Message) -> None:
         """Send a message."""
