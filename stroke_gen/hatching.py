@@ -7,6 +7,7 @@ apart by stamping finished legs on a map.
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -145,7 +146,7 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
             found = False
             for p in range(used - 1, max(begin, used - 1 - int(np.float32(3) * spacing / step)), -1):
                 nx, ny = points[p, 0] - side * ty * spacing, points[p, 1] + side * tx * spacing
-                if 0 <= nx < w and 0 <= ny < h and want[int(ny), int(nx)] > 0 and _free(stamp, nx, ny, fine, 2):
+                if 0 <= nx < w and 0 <= ny < h and want[int(ny), int(nx)] > 0 and _free(stamp, nx, ny, fine, 1):
                     x, y, found = nx, ny, True
                     break
             side = -side  # the direction has turned about, the side on the sheet has not
@@ -189,8 +190,9 @@ def _seeds(want: Floats, how: Hatch, rng: np.random.Generator) -> Floats:
     """Places to begin, one to a spacing, region by region as a hand moves over the sheet."""
     h, w = want.shape
     pitch = max(how.spacing * 0.7, 1.0)
-    y, x = np.mgrid[0:h:pitch, 0:w:pitch].reshape(2, -1)
-    jitter = rng.random((2, x.size)) * pitch
+    left, top, width, height = cv2.boundingRect((want > 0).astype(np.uint8))
+    y, x = np.mgrid[top : top + height : pitch, left : left + width : pitch].reshape(2, -1)
+    jitter = rng.random((2, x.size), np.float32) * pitch
     x, y = np.minimum(x + jitter[0], w - 1e-3), np.minimum(y + jitter[1], h - 1e-3)
     wanted = want[y.astype(int), x.astype(int)] > 0
     x, y = x[wanted], y[wanted]

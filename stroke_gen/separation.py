@@ -188,7 +188,7 @@ def plates(
         need |= cv2.dilate((chosen == k).astype(np.uint8), disc).astype(np.uint64) << np.uint64(k)
     gain, best = gains(current, aim, swatches, need, coat, plan.threads)
     steps = np.log(swatches.pressures)
-    level = np.log(base_pressure(plan, aim)) if coat.kind == "base" else None
+    level = np.log(np.minimum(base_pressure(plan, aim), coat.hardest)) if coat.kind == "base" else None
     wants = {}
     for k in np.unique(chosen):
         here = (chosen == k) & (plan.scene.detail >= coat.detail) & (blur(gain[k], coat.edge * cells) > coat.gain)

@@ -54,7 +54,15 @@ def good_files() -> dict[str, bytes]:
 def bad_files() -> Files:
     """At least 120 files that are broken, bombs, odd, or not what they are called."""
     files: Files = {}
-    for group in (_impostors(), _cut_short(), _png_lies(), _sizes(), _jpeg_lies(), _tiff_lies(), _odd_but_whole()):
+    for group in (
+        _impostors(),
+        _cut_short(),
+        _png_lies(),
+        _sizes(),
+        _jpeg_lies(),
+        _tiff_lies(),
+        _odd_but_whole(),
+    ):
         files |= group
     return files
 
@@ -101,18 +109,31 @@ def _impostors() -> Files:
     frames = [Image.new("P", (8, 8), i % 256) for i in range(1000)]
     picture = noise()
     contents = {
-        "empty.jpg": b"", "one-byte.jpg": b"\xff", "two-bytes.jpg": b"\xff\xd8", "text.jpg": b"Not a picture.\n",
-        "page.png": b"<!DOCTYPE html><html><body>404 Not Found</body></html>", "archive.jpg": pack.getvalue(),
-        "document.png": b"%PDF-1.7\n1 0 obj\n<<>>\nendobj\n", "zeros.png": bytes(5000), "ones.tif": b"\xff" * 5000,
-        "script.jpg": b"#!/bin/sh\nexit 1\n", "drawing.png": b'<svg xmlns="http://www.w3.org/2000/svg"/>',
+        "empty.jpg": b"",
+        "one-byte.jpg": b"\xff",
+        "two-bytes.jpg": b"\xff\xd8",
+        "text.jpg": b"Not a picture.\n",
+        "page.png": b"<!DOCTYPE html><html><body>404 Not Found</body></html>",
+        "archive.jpg": pack.getvalue(),
+        "document.png": b"%PDF-1.7\n1 0 obj\n<<>>\nendobj\n",
+        "zeros.png": bytes(5000),
+        "ones.tif": b"\xff" * 5000,
+        "script.jpg": b"#!/bin/sh\nexit 1\n",
+        "drawing.png": b'<svg xmlns="http://www.w3.org/2000/svg"/>',
         "bomb.png": b'<!DOCTYPE l [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><svg>&b;</svg>',
         "postscript.jpg": b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\nshowpage\n",
         "film.gif.png": saved(frames[0], "GIF", save_all=True, append_images=frames[1:]),
-        "windows.jpg": saved(picture, "BMP"), "icon.png": saved(picture, "ICO"), "plain.tif": saved(picture, "PPM"),
-        "targa.jpg": saved(picture, "TGA"), "photoshop.jpg": b"8BPS\x00\x01" + bytes(20), "j2k.jpg": saved(picture, "JPEG2000"),
-        "riff.webp": b"RIFF\x24\x00\x00\x00WAVEfmt " + bytes(28), "brand.heic": _box(b"ftyp", b"heicmif1") + bytes(40),
-        "film.avif": _box(b"ftyp", b"isommp42") + bytes(40), "noise.jpg": random.Random(2).randbytes(3000),
-    }  # fmt: skip
+        "windows.jpg": saved(picture, "BMP"),
+        "icon.png": saved(picture, "ICO"),
+        "plain.tif": saved(picture, "PPM"),
+        "targa.jpg": saved(picture, "TGA"),
+        "photoshop.jpg": b"8BPS\x00\x01" + bytes(20),
+        "j2k.jpg": saved(picture, "JPEG2000"),
+        "riff.webp": b"RIFF\x24\x00\x00\x00WAVEfmt " + bytes(28),
+        "brand.heic": _box(b"ftyp", b"heicmif1") + bytes(40),
+        "film.avif": _box(b"ftyp", b"isommp42") + bytes(40),
+        "noise.jpg": random.Random(2).randbytes(3000),
+    }
     return {f"impostor-{name}": (content, FAILED) for name, content in contents.items()}
 
 
@@ -136,7 +157,9 @@ def _chunk(kind: bytes, content: bytes, crc: int | None = None) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", sum_)
 
 
-def _png(width: int, height: int, body: bytes, head: bytes = b"\x08\x02\x00\x00\x00", more: bytes = b"") -> bytes:
+def _png(
+    width: int, height: int, body: bytes, head: bytes = b"\x08\x02\x00\x00\x00", more: bytes = b""
+) -> bytes:
     header = _chunk(b"IHDR", struct.pack(">II", width, height) + head)
     return b"\x89PNG\r\n\x1a\n" + header + more + _chunk(b"IDAT", body) + _chunk(b"IEND", b"")
 
@@ -148,7 +171,10 @@ def _png_lies() -> Files:
     at = good.index(b"IDAT")
     bomb = zlib.compress(bytes(80_000_000), 9)
     return {
-        "png-crc-of-data.png": (good[: at + 4 + len(rows)] + b"\0\0\0\0" + good[at + 8 + len(rows) :], EITHER),
+        "png-crc-of-data.png": (
+            good[: at + 4 + len(rows)] + b"\0\0\0\0" + good[at + 8 + len(rows) :],
+            EITHER,
+        ),
         "png-crc-of-header.png": (good[:29] + b"\0\0\0\0" + good[33:], FAILED),
         "png-no-size.png": (_png(0, 0, rows), FAILED),
         "png-no-height.png": (_png(10, 0, rows), FAILED),
@@ -165,7 +191,10 @@ def _png_lies() -> Files:
         "png-short-chunk.png": (good[: at - 4] + struct.pack(">I", 0x7FFFFFF0) + good[at:], EITHER),
         "png-text-bomb.png": (_png(10, 10, rows, more=_chunk(b"zTXt", b"a\0\0" + bomb)), EITHER),
         "png-profile-bomb.png": (_png(10, 10, rows, more=_chunk(b"iCCP", b"a\0\0" + bomb)), EITHER),
-        "png-strange-profile.png": (_png(10, 10, rows, more=_chunk(b"iCCP", b"a\0\0" + zlib.compress(bytes(200)))), OK),
+        "png-strange-profile.png": (
+            _png(10, 10, rows, more=_chunk(b"iCCP", b"a\0\0" + zlib.compress(bytes(200)))),
+            OK,
+        ),
         "png-thousand-chunks.png": (_png(10, 10, rows, more=_chunk(b"tEXt", b"a\0b") * 1000), OK),
         "png-more-behind.png": (good + b"PK\x03\x04" + bytes(100), OK),
     }
@@ -184,7 +213,10 @@ def _sizes() -> Files:
         "size-65535x1.png": (saved(Image.new("L", (65535, 1)), "PNG"), OK),
         "size-1x65500.jpg": (saved(Image.new("L", (1, 65500)), "JPEG"), OK),
         "size-89-million.png": (_png(side, side, zeros, b"\x08\x00\x00\x00\x00"), OK),
-        "size-too-long.png": (_png(2 * million, 1, zlib.compress(bytes(2 * million + 1)), b"\x08\0\0\0\0"), FAILED),
+        "size-too-long.png": (
+            _png(2 * million, 1, zlib.compress(bytes(2 * million + 1)), b"\x08\0\0\0\0"),
+            FAILED,
+        ),
         "size-900-million.png": (_png(30000, 30000, zlib.compress(bytes(1000))), FAILED),
     }
 
@@ -230,10 +262,18 @@ def _tiff_lies() -> Files:
     """TIFF files whose directory lies."""
 
     def tiff(changes: dict[int, tuple[int, int, int]], next_: int = 0) -> bytes:
-        tags = {256: (4, 1, 8), 257: (4, 1, 8), 258: (3, 1, 8), 259: (3, 1, 1), 262: (3, 1, 1), 273: (4, 1, 8),
+        tags = {256: (4, 1, 8), 257: (4, 1, 8), 258: (3, 1, 8), 259: (3, 1, 1), 262: (3, 1, 1), 273: (4,
+        1, 8),
                 277: (3, 1, 1), 278: (4, 1, 8), 279: (4, 1, 64)} | changes  # fmt: skip
         rows = b"".join(struct.pack("<HHII", tag, *value) for tag, value in sorted(tags.items()))
-        return b"II*\0" + struct.pack("<I", 72) + bytes(64) + struct.pack("<H", len(tags)) + rows + struct.pack("<I", next_)
+        return (
+            b"II*\0"
+            + struct.pack("<I", 72)
+            + bytes(64)
+            + struct.pack("<H", len(tags))
+            + rows
+            + struct.pack("<I", next_)
+        )
 
     lies: dict[str, tuple[dict[int, tuple[int, int, int]], str]] = {
         "no-width": ({256: (4, 1, 0)}, FAILED),
@@ -252,7 +292,10 @@ def _tiff_lies() -> Files:
         "type-99": ({256: (99, 1, 8)}, FAILED),
     }
     files = {f"tiff-{name}.tif": (tiff(changes), verdict) for name, (changes, verdict) in lies.items()}
-    return files | {"tiff-in-a-circle.tif": (tiff({}, next_=72), OK), "tiff-no-directory.tif": (b"II*\0\xff\xff\xff\xff", FAILED)}
+    return files | {
+        "tiff-in-a-circle.tif": (tiff({}, next_=72), OK),
+        "tiff-no-directory.tif": (b"II*\0\xff\xff\xff\xff", FAILED),
+    }
 
 
 def _odd_but_whole() -> Files:
@@ -262,18 +305,27 @@ def _odd_but_whole() -> Files:
     see_through = PngImagePlugin.PngInfo()
     see_through.add(b"tRNS", b"\0\x10\0\x20\0\x30")
     contents = {
-        "grey16.png": saved(Image.fromarray(grey), "PNG"), "grey16.tif": saved(Image.fromarray(grey), "TIFF"),
-        "float.tif": saved(Image.fromarray((grey / 65535).astype(np.float32)), "TIFF"), "bit.png": saved(picture.convert("1"), "PNG"),
-        "bit.tif": saved(picture.convert("1"), "TIFF", compression="group4"), "la.png": saved(noise("LA"), "PNG"),
-        "rgba.webp": saved(noise("RGBA"), "WEBP"), "rgba.tif": saved(noise("RGBA"), "TIFF"),
+        "grey16.png": saved(Image.fromarray(grey), "PNG"),
+        "grey16.tif": saved(Image.fromarray(grey), "TIFF"),
+        "float.tif": saved(Image.fromarray((grey / 65535).astype(np.float32)), "TIFF"),
+        "bit.png": saved(picture.convert("1"), "PNG"),
+        "bit.tif": saved(picture.convert("1"), "TIFF", compression="group4"),
+        "la.png": saved(noise("LA"), "PNG"),
+        "rgba.webp": saved(noise("RGBA"), "WEBP"),
+        "rgba.tif": saved(noise("RGBA"), "TIFF"),
         "palette-see-through.png": saved(picture.quantize(8), "PNG", transparency=bytes(range(0, 64, 8))),
-        "key.png": saved(picture, "PNG", pnginfo=see_through), "cmyk.jpg": saved(picture.convert("CMYK"), "JPEG"),
-        "cmyk.tif": saved(picture.convert("CMYK"), "TIFF"), "lab.tif": saved(Image.new("LAB", (40, 30)), "TIFF"),
-        "restart.jpg": saved(picture, "JPEG", restart_marker_blocks=1), "grey.jpg": saved(picture.convert("L"), "JPEG"),
+        "key.png": saved(picture, "PNG", pnginfo=see_through),
+        "cmyk.jpg": saved(picture.convert("CMYK"), "JPEG"),
+        "cmyk.tif": saved(picture.convert("CMYK"), "TIFF"),
+        "lab.tif": saved(Image.new("LAB", (40, 30)), "TIFF"),
+        "restart.jpg": saved(picture, "JPEG", restart_marker_blocks=1),
+        "grey.jpg": saved(picture.convert("L"), "JPEG"),
         "film.png": saved(picture, "PNG", save_all=True, append_images=[noise(seed=1)]),
         "film.webp": saved(picture, "WEBP", save_all=True, append_images=[noise(seed=1)]),
-        "interlaced.jpg": saved(picture, "PNG"), "jpeg.png": saved(picture, "JPEG"), "webp.tif": saved(picture, "WEBP"),
-    }  # fmt: skip
+        "interlaced.jpg": saved(picture, "PNG"),
+        "jpeg.png": saved(picture, "JPEG"),
+        "webp.tif": saved(picture, "WEBP"),
+    }
     for turn in range(1, 9):
         exif = Image.Exif()
         exif[274] = turn

@@ -1,5 +1,7 @@
 """Scheduling: strokes of one level never meet, order is kept, and the work is shared out whole."""
 
+import threading
+
 import naive
 import numpy as np
 import pytest
@@ -22,11 +24,23 @@ def random_paths(rng, number, size, far=60):
     ]
 
 
+def levels(order):
+    """One more than the highest level among those a stroke waits for, from the graph alone."""
+    level = np.zeros(len(order.waits), int)
+    waits = order.waits.copy()
+    for s in range(len(level)):
+        assert waits[s] == 0  # all it waits for come before it
+        for heir in order.heirs[order.first[s] : order.first[s + 1]]:
+            level[heir] = max(level[heir], level[s] + 1)
+            waits[heir] -= 1
+    return level
+
+
 def test_levels_are_those_of_a_plain_search():
     rng = np.random.default_rng(1)
     points, first = packed(random_paths(rng, 150, 400))
     reach = rng.uniform(2, 30, 150).astype(np.float32)
-    level = schedule.levels(points, first, reach, 390, 410)
+    level = levels(schedule.order(points, first, reach, 390, 410))
     widened = reach + schedule.TILE // 2
     assert level.tolist() == naive.levels(points, first, widened, 390, 410, schedule.TILE)
     assert level.max() > 2 and np.bincount(level).max() > 3
@@ -38,7 +52,7 @@ def test_strokes_that_come_close_are_drawn_in_order(far):
     rng = np.random.default_rng(2)
     size, number, reach = 250, 90, 5.0
     paths = random_paths(rng, number, size, far)
-    level = schedule.levels(*packed(paths), np.full(number, reach, np.float32), size, size)
+    level = levels(schedule.order(*packed(paths), np.full(number, reach, np.float32), size, size))
     dense = []
     for path in paths:
         way = np.append(0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))
@@ -59,10 +73,10 @@ def test_strokes_of_one_level_change_disjoint_cells(bench, monkeypatch):
     """Smearing included: each stroke is drawn alone on a coated sheet, and what it changes is compared."""
     rng = np.random.default_rng(3)
     strokes = bench.scribble(rng, 60, 20.0)
-    found, search = [], schedule.levels
-    monkeypatch.setattr(schedule, "levels", lambda *given: found.append(search(*given)) or found[-1])
+    found, search = [], schedule.order
+    monkeypatch.setattr(schedule, "order", lambda *given: found.append(search(*given)) or found[-1])
     bench.draw(bench.felt(200, 200), strokes)
-    level = found[0]
+    level = levels(found[0])
     assert np.bincount(level).max() > 3
     owner = np.full((level.max() + 1, 200 * 200), -1)
     coat = 15 * rng.random(200 * 200).astype(np.float32)
@@ -78,8 +92,8 @@ def test_strokes_of_one_level_change_disjoint_cells(bench, monkeypatch):
 
 @pytest.mark.parametrize("kind", ["blunt", "side"])
 def test_no_cell_beyond_the_reach_is_changed(bench, monkeypatch, kind):
-    reaches, search = [], schedule.levels
-    monkeypatch.setattr(schedule, "levels", lambda *given: reaches.append(given[2][0]) or search(*given))
+    reaches, search = [], schedule.order
+    monkeypatch.setattr(schedule, "order", lambda *given: reaches.append(given[2][0]) or search(*given))
     rng = np.random.default_rng(5)
     for _ in range(30):
         sheet = bench.sheet(np.zeros((80, 80)))
@@ -92,17 +106,35 @@ def test_no_cell_beyond_the_reach_is_changed(bench, monkeypatch, kind):
         assert max(rows.max() + 1 - 10 * y, 10 * y - rows.min()) <= reaches[-1]
 
 
-def test_shares_hold_every_stroke_once_and_about_the_same_work():
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+def test_every_stroke_is_drawn_once_and_after_those_it_waits_for(threads):
     rng = np.random.default_rng(4)
-    cost = rng.exponential(1.0, 300)
-    members = rng.permutation(300)[:200]
-    for threads in (1, 2, 3, 4, 8):
-        shares = schedule.shares(members, cost, threads)
-        assert sorted(np.concatenate(shares)) == sorted(members)
-        work = [cost[share].sum() for share in shares]
-        assert len(shares) == threads and max(work) - min(work) < 2 * cost.max()
-    assert [s.tolist() for s in schedule.shares(members[:2], cost, 8)] in (
-        [[members[0]], [members[1]]],
-        [[members[1]], [members[0]]],
-    )
-    assert schedule.shares(members[:1], cost, 4)[0].tolist() == [members[0]]
+    points, first = packed(random_paths(rng, 300, 900))
+    order = schedule.order(points, first, np.full(300, 5, np.float32), 900, 900)
+    lock, done, reported = threading.Lock(), [], []
+
+    def draw(picked):
+        with lock:
+            for s in picked:
+                before = [p for p in range(300) if s in order.heirs[order.first[p] : order.first[p + 1]]]
+                assert set(before) <= set(done)
+                done.append(int(s))
+
+    schedule.run(draw, order, rng.exponential(1e4, 300), threads, reported.append)
+    assert sorted(done) == list(range(300))
+    assert reported == sorted(reported) and reported[-1] == 300
+
+
+def test_a_failure_in_a_thread_is_raised_and_ends_the_work():
+    points, first = packed([np.array([[5.0, 5.0]])] * 50)
+    order = schedule.order(points, first, np.full(50, 5, np.float32), 64, 64)
+    drawn = []
+
+    def draw(picked):
+        drawn.extend(picked)
+        if len(drawn) == 3:
+            raise RuntimeError("out of wax")
+
+    with pytest.raises(RuntimeError, match="out of wax"):
+        schedule.run(draw, order, np.full(50, 1e9), 4)
+    assert len(drawn) == 3

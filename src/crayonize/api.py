@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from stroke_gen.drawing import Drawing
 
-    from .pipeline import Easel
+    from .pipeline import Easel, Watch
 
     Photo = str | os.PathLike[str] | Image | NDArray[Any]
 
@@ -33,7 +34,7 @@ Progress = Callable[[str, float], None]  # what is being done, how much of all i
 MAX_SIZE = 20_000  # pixels along the long side
 MAX_THREADS = 256
 PHOTO_SIDE = 2048  # pixels of the photo's long side that are read: three times what the planner looks at
-STROKE_SUFFIXES = (".json",)
+STROKE_SUFFIXES = (".json", ".svg")
 _MM_PER_INCH = 25.4
 
 
@@ -42,6 +43,10 @@ def convert(
     out: str | os.PathLike[str] | None = None,
     *,
     strokes: str | os.PathLike[str] | None = None,
+    timelapse: str | os.PathLike[str] | None = None,
+    seconds: float = 12.0,
+    show_tip: bool = False,
+    legend: bool = False,
     light: bool = True,
     progress: Progress | None = None,
     **choices: Any,
@@ -50,7 +55,10 @@ def convert(
 
     image: a path, a Pillow image, or an array as `image_read.read_linear` takes it.
     out: where to write the drawing (PNG, JPEG, WebP or TIFF), with settings and seed inside.
-    strokes: where to save the strokes (.json), from which `draw` makes the same picture at any size.
+    strokes: where to save the strokes (.json), from which `draw` makes the same picture at any size; .svg for
+        other programs.
+    timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4), `seconds` long; show_tip: with the
+        crayon in view.   legend: put the crayons used beside the picture.
     light: shade the relief of paper and wax.   progress: called with a name and the share done, 0..1.
     choices: any field of `Settings` (palette, paper, style, force, size, seed, threads, preview, focus, ...).
 
@@ -62,8 +70,10 @@ def convert(
     from PIL import Image
 
     settings = settings_of(choices)
-    check_outputs([image, *used_files(settings)], out, strokes)
-    picture = finish(*sketch(image, settings, progress), out, strokes, light=light, settings=settings)
+    check_outputs([image, *used_files(settings)], out, strokes, timelapse)
+    with filming(timelapse, seconds, show_tip) as watch:
+        drawn = sketch(image, settings, progress, watch)
+    picture = finish(*drawn, out, strokes, light=light, settings=settings, legend=legend)
     if isinstance(image, np.ndarray):
         return picture
     if out is not None and not isinstance(image, Image.Image):
@@ -124,9 +134,12 @@ def used_files(settings: Settings) -> list[str]:
 
 
 def check_outputs(
-    inputs: list[Any], out: str | os.PathLike[str] | None, strokes: str | os.PathLike[str] | None = None
+    inputs: list[Any],
+    out: str | os.PathLike[str] | None,
+    strokes: str | os.PathLike[str] | None = None,
+    timelapse: str | os.PathLike[str] | None = None,
 ) -> None:
-    """Before any work: outputs have a format and a folder, and none is an input or the other output.
+    """Before any work: outputs have a format and a folder, and none is an input or another output.
 
     ValueError for what is wrong with a path, PermissionError for a folder that may not be written to.
     """
@@ -137,7 +150,7 @@ def check_outputs(
     if strokes is not None and Path(strokes).suffix.lower() not in STROKE_SUFFIXES:
         raise ValueError(f"{strokes}: strokes can be saved as {', '.join(STROKE_SUFFIXES)} only")
     taken = [path for path in inputs if isinstance(path, str | os.PathLike)]
-    for output in (out, strokes):
+    for output in (out, strokes, timelapse):
         if output is None:
             continue
         for path in taken:
@@ -153,7 +166,22 @@ def check_outputs(
         taken.append(output)
 
 
-def sketch(image: Photo, settings: Settings, progress: Progress | None = None) -> tuple[Drawing, Easel]:
+def filming(
+    path: str | os.PathLike[str] | None, seconds: float = 12.0, show_tip: bool = False
+) -> AbstractContextManager[Watch | None]:
+    """What `sketch` and `redraw` take as `watch` to film the drawing into `path`; nothing for None."""
+    if path is None:
+        return nullcontext()
+    workshop()
+    from . import timelapse
+
+    cache.keep_kernels()
+    return timelapse.Timelapse(path, seconds, show_tip)
+
+
+def sketch(
+    image: Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
+) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
     from . import paper
     from .image_read import read_linear
@@ -161,7 +189,7 @@ def sketch(image: Photo, settings: Settings, progress: Progress | None = None) -
     ground = paper.colour_linear(paper.load_paper(settings.paper).colour)
     photo = read_linear(image, PHOTO_SIDE, ground)
     check_size(photo.shape[1], photo.shape[0], settings.size, settings.preview)
-    drawn: tuple[Drawing, Easel] = workshop().sketch(photo, settings, progress)
+    drawn: tuple[Drawing, Easel] = workshop().sketch(photo, settings, progress, watch)
     return drawn
 
 
@@ -173,17 +201,51 @@ def redraw(
     progress: Progress | None = None,
     *,
     out: str | os.PathLike[str] | None = None,
+    watch: Watch | None = None,
 ) -> tuple[Drawing, Easel]:
     """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the sheet."""
-    from stroke_gen.drawing import Drawing, load_drawing
+    from stroke_gen.drawing import Drawing
 
     _check_whole("size", size, 1, MAX_SIZE)
     _check_threads(threads)
     check_outputs([drawing], out)
-    drawing = drawing if isinstance(drawing, Drawing) else load_drawing(drawing)
+    drawing = drawing if isinstance(drawing, Drawing) else load_strokes(drawing)
     check_size(drawing.width_mm, drawing.height_mm, size, preview)
-    easel: Easel = workshop().draw(drawing, size, threads=threads, preview=preview, progress=progress)
+    easel: Easel = workshop().draw(drawing, size, threads=threads, preview=preview, progress=progress,
+                                   watch=watch)  # fmt: skip
     return drawing, easel
+
+
+def load_strokes(
+    path: str | os.PathLike[str],
+    *,
+    palette: str | None = None,
+    paper: str | None = None,
+    widths: str = "tip",
+    say: Callable[[str], None] | None = None,
+) -> Drawing:
+    """A drawing's file: our .json, or lines of another program as .svg.
+
+    palette, paper: in place of the drawing's own.   widths, say: of an SVG, see svg_in.
+    """
+    from dataclasses import replace
+
+    from stroke_gen.drawing import load_drawing
+
+    from .svg_in import load_svg
+
+    if Path(path).suffix.lower() == ".svg":
+        return load_svg(path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say)
+    drawing = load_drawing(path)
+    return replace(drawing, palette=palette or drawing.palette, paper=paper or drawing.paper)
+
+
+def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None) -> list[Path]:
+    """Pages that show how to draw a Drawing, as a .pdf or .png files; see steps.py."""
+    workshop()
+    from . import steps
+
+    return steps.save_steps(drawing, out, progress)
 
 
 def check_size(width: float, height: float, size: int, preview: bool) -> None:
@@ -201,11 +263,12 @@ def finish(
     light: bool,
     settings: Settings | None = None,
     kept: Exif | None = None,
+    legend: bool = False,
 ) -> NDArray[np.uint8]:
     """The picture as uint8 sRGB; written to `out` and its strokes to `strokes` if these are given.
 
     settings: of the photo, to be noted in the picture beside what the drawing itself says.
-    kept: tags of the photo that go into the picture, see metadata.py.
+    kept: tags of the photo that go into the picture, see metadata.py.   legend: with the crayons used.
     """
     from stroke_gen.drawing import save_drawing
 
@@ -213,12 +276,21 @@ def finish(
     from .image_write import write_image
 
     picture = encode_srgb(easel.picture(light))
+    if legend:
+        from .legend import with_legend
+
+        picture = with_legend(picture, drawing, easel, light=light)
     if out is not None:
         dpi = easel.sheet.cols / drawing.width_mm * _MM_PER_INCH
         told = notes(drawing, settings) | {"light": light, "smears": easel.smears}
         write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None, kept=kept)
     if strokes is not None:
-        save_drawing(drawing, strokes)
+        if Path(strokes).suffix.lower() == ".svg":
+            from .svg_out import save_svg
+
+            save_svg(drawing, strokes)
+        else:
+            save_drawing(drawing, strokes)
     return picture
 
 

@@ -1,6 +1,6 @@
 """The command `crayonize`: options in, one picture out, errors as one line.
 
-The first word chooses: draw, palettes, styles, papers or warmup; anything else is a photo. Only here is
+The first word chooses: draw, steps, palettes, styles, papers or warmup; anything else is a photo. Only here is
 anything printed: what was asked for on stdout, all else on stderr. `--help` and the listings load neither
 numpy nor numba, so imports of anything heavy stand inside functions.
 
@@ -25,12 +25,15 @@ from .did_you_mean import did_you_mean, printable
 from .settings import Settings
 
 if TYPE_CHECKING:
+    from stroke_gen.drawing import Drawing
+
     from .api import Progress
     from .pipeline import Easel
 
 _COMMANDS_HELP = """\
 other commands:
-  crayonize draw DRAWING.json OUT   draw saved or hand-made strokes
+  crayonize draw DRAWING OUT        draw saved, hand-made or other programs' strokes (.json, .svg)
+  crayonize steps DRAWING OUT.pdf   pages that show how to draw it, step by step
   crayonize palettes|styles|papers  list what there is
   crayonize warmup                  compile everything for this machine now
 """
@@ -107,17 +110,21 @@ def _convert(words: Sequence[str]) -> int:
     load_palette(settings.palette)
     params.with_force(params.load_style(settings.style), settings.force)
     if folders:
+        if options.timelapse or options.legend:
+            raise ValueError("--timelapse and --legend are for one photo")
         return batch.run_parsed(*folders, options, settings)
 
     photo = Path(options.photo)
     out = options.out or options.output or photo.with_name(f"{photo.stem}.crayon.png")
     batch.check_alone(options)
-    api.check_outputs([photo, *api.used_files(settings)], out, options.strokes)
+    api.check_outputs([photo, *api.used_files(settings)], out, options.strokes, options.timelapse)
     settings = page.fitted_to(settings, options.print, options.dpi, photo)
     kept = metadata.kept_of(photo, options.metadata)
     with _talk(options) as progress:
-        drawing, easel = api.sketch(options.photo, settings, progress)
-        api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings, kept=kept)
+        with api.filming(options.timelapse, options.seconds, options.show_tip) as watch:
+            drawing, easel = api.sketch(options.photo, settings, progress, watch)
+        api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings, kept=kept,
+                   legend=options.legend)  # fmt: skip
     if options.verbose or (options.out is None and not options.quiet):
         _report(out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
@@ -130,14 +137,43 @@ def _draw(words: Sequence[str]) -> int:
 
     from . import api
 
+    api.check_outputs([options.drawing], options.out, options.strokes, options.timelapse)
     with _talk(options) as progress:
-        drawing, easel = api.redraw(
-            options.drawing, options.size, options.threads, options.preview, progress, out=options.out
-        )
-        api.finish(drawing, easel, options.out, light=options.light)
+        given = _strokes(options)
+        with api.filming(options.timelapse, options.seconds, options.show_tip) as watch:
+            drawing, easel = api.redraw(given, options.size, options.threads, options.preview, progress, watch=watch)
+        api.finish(drawing, easel, options.out, options.strokes, light=options.light, legend=options.legend)
     if options.verbose:
         _report(options.out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
+
+
+def _steps(words: Sequence[str]) -> int:
+    """crayonize steps DRAWING OUT: pages to draw it after."""
+    parser = _Parser("crayonize steps", "Make pages that show how to draw it: the outline, then crayon by crayon.")
+    parser.add_argument("drawing", metavar="DRAWING", help="a .json or .svg file of strokes")
+    parser.add_argument("out", metavar="OUT", help="a .pdf, a .png (pages are numbered), or a folder for .png pages")
+    _add_strokes(parser)
+    _add_talk(parser)
+    options = parser.read(words)
+
+    from . import api
+
+    with _talk(options) as progress:
+        api.save_steps(_strokes(options), options.out, progress)
+    return 0
+
+
+def _strokes(options: argparse.Namespace) -> "Drawing":
+    """The drawing that the command line names."""
+    import logging
+
+    from . import api
+
+    say = logging.getLogger("crayonize").info
+    return api.load_strokes(
+        options.drawing, palette=options.palette, paper=options.paper, widths=options.widths, say=say
+    )
 
 
 def _warmup(words: Sequence[str]) -> int:
@@ -189,6 +225,7 @@ def _list(rows: Iterator[tuple[str, str]]) -> int:
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "draw": _draw,
+    "steps": _steps,
     "palettes": _palettes,
     "styles": _styles,
     "papers": _papers,
@@ -284,7 +321,7 @@ def _convert_parser() -> _Parser:
     add("--dpi", type=_dpi, help="pixels to the inch, in place of --size (300 with --print)")
     add("--metadata", choices=metadata.CHOICES, default="safe",
         help="what the photo tells of itself: safe keeps title, names and date, but no place (%(default)s)")  # fmt: skip
-    add("--strokes", metavar="FILE", help="save the strokes as .json, for `crayonize draw`")
+    _add_beside(parser)
     _add_size(parser)
     _add_talk(parser)
     add_folder_options(parser)
@@ -294,11 +331,29 @@ def _convert_parser() -> _Parser:
 
 def _draw_parser() -> _Parser:
     parser = _Parser("crayonize draw", "Draw saved or hand-made strokes.")
-    parser.add_argument("drawing", metavar="DRAWING", help="a .json file of strokes")
+    parser.add_argument("drawing", metavar="DRAWING", help="a .json or .svg file of strokes")
     parser.add_argument("out", metavar="OUT", help="PNG, JPEG, WebP or TIFF")
+    _add_strokes(parser)
+    _add_beside(parser)
     _add_size(parser)
     _add_talk(parser)
     return parser
+
+
+def _add_strokes(parser: _Parser) -> None:
+    add = parser.add_argument
+    add("--palette", help="in place of the drawing's own; for a .svg else box24")
+    add("--paper", help="in place of the drawing's own; for a .svg else drawing")
+    add("--widths", choices=("tip", "force"), default="tip", help="what line width becomes, of a .svg (%(default)s)")
+
+
+def _add_beside(parser: _Parser) -> None:
+    add = parser.add_argument
+    add("--strokes", metavar="FILE", help="save the strokes: .json for `crayonize draw`, .svg for other programs")
+    add("--timelapse", metavar="FILE", help="film the drawing being drawn: .webp, .gif, .png or .mp4")
+    add("--seconds", type=float, default=12.0, help="length of the film (%(default)g)")
+    add("--show-tip", action="store_true", help="with the crayon in the film")
+    add("--legend", action="store_true", help="put the crayons used, and how much of each, beside the drawing")
 
 
 def _add_size(parser: _Parser) -> None:

@@ -58,7 +58,7 @@ def check(path: str | os.PathLike[str]) -> None:
         raise ValueError(
             f"{os.fspath(path)!r}: MP4 needs PyAV (pip install 'crayonize[video]') or ffmpeg on the PATH; "
             "WebP, GIF and PNG need neither"
-        )
+        ) from ModuleNotFoundError("av")
     check_target(path)
 
 

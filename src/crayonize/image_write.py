@@ -41,7 +41,8 @@ def write_image(
 
     path: PNG, JPEG, WebP or TIFF by its suffix; a link is replaced, never written through.
     srgb8: uint8 (h, w, 3), sRGB-encoded. settings: stored inside, see read_settings. dpi: pixels per inch on
-    paper. quality: 1..100, of JPEG and WebP. kept: tags of the photo, see metadata.py. The sRGB profile goes in, no time does.
+    paper. quality: 1..100, of JPEG and WebP. kept: tags of the photo, see metadata.py. The sRGB profile goes in,
+    no time does.
     ValueError for what the caller can mend; OSError with the path if the disk is full or refuses.
     """
     target, format_ = Path(os.fsdecode(path)), file_format(path)

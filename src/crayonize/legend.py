@@ -5,7 +5,6 @@ The panel is a drawing of its own on the same paper, rubbed by the same simulato
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,6 @@ from . import pipeline
 from .image_color import encode_srgb
 from .palette import Crayon, Palette
 from .svg_out import luminance
-
-if TYPE_CHECKING:
-    from PIL.ImageDraw import ImageDraw
 
 Picture = NDArray[np.uint8]  # (h, w, 3) sRGB
 
@@ -77,7 +73,8 @@ def panel(
     """
     cell_mm = _cell_mm(drawing, unit)
     wide = (width / unit - 2 * MARGIN) / across
-    places = [(MARGIN + (i % across) * wide, MARGIN + TITLE + (i // across) * ENTRY[1]) for i in range(len(used))]
+    top = MARGIN + (TITLE if title else 0)
+    places = [(MARGIN + (i % across) * wide, top + (i // across) * ENTRY[1]) for i in range(len(used))]
     strokes = [patch(x, y, *PATCH, one.crayon.name, unit * cell_mm) for (x, y), one in zip(places, used, strict=True)]
     made = scrap(drawing, strokes, width, height, cell_mm, light=light)
     lettering = Lettering(made, unit)
@@ -129,7 +126,7 @@ class Lettering:
         from PIL import Image, ImageDraw
 
         self._image = Image.fromarray(picture)
-        self._draw: ImageDraw = ImageDraw.Draw(self._image)
+        self._draw = ImageDraw.Draw(self._image)
         self._unit = unit
         dark = float(np.median(picture[..., 1])) < 110
         self.ink = PALE if dark else DARK
@@ -154,5 +151,3 @@ class Lettering:
     def picture(self) -> Picture:
         """The picture with the words on it."""
         return np.asarray(self._image).copy()
-
-

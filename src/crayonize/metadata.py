@@ -17,9 +17,11 @@ CHOICES = ("none", "safe", "all")
 _EXIF_FOLDER, _GPS_FOLDER = 0x8769, 0x8825
 _TITLE, _DESCRIPTION, _DATE, _DATE_TAKEN = 40091, 270, 306, 36867
 _SAFE = frozenset((_TITLE, 315, 33432))  # title, artist, copyright
-_SAFE_INSIDE = frozenset((_DATE_TAKEN, 36880, 36881, 37520, 37521))  # when it was taken: date, offset, fractions
+_SAFE_INSIDE = frozenset(
+    (_DATE_TAKEN, 36880, 36881, 37520, 37521)
+)  # when it was taken: date, offset, fractions
 _COLOUR_SPACE, _SRGB = 40961, 1
-_LAYOUT = frozenset(  # sizes, strips, tiles, resolution, orientation, software, profile, previews, packed metadata
+_LAYOUT = frozenset(  # sizes, strips, tiles, resolution, orientation, software, profile, previews, packets
     (*range(254, 270), *range(273, 285), 296, 301, 305, *range(317, 348), *range(512, 533), 700, 33723, 34377,
      _EXIF_FOLDER, _GPS_FOLDER, 34675, 50341, 37500, 40961, 40962, 40963, 40965)
 )  # fmt: skip
@@ -27,7 +29,7 @@ _LONGEST = 60_000  # bytes, as JPEG holds 64 kB
 
 
 def kept(picture: Image, which: str) -> Exif | None:
-    """The tags of an open photo that go along: "none", "safe" (title, names, date; no place) or "all" of EXIF.
+    """The tags of an open photo that go along: none, safe (title, names, date; no place) or all of EXIF.
 
     None if there are none, or if they are too damaged or too many to be written.
     """
@@ -47,7 +49,7 @@ def kept(picture: Image, which: str) -> Exif | None:
         _add_folder(new, _EXIF_FOLDER, _chosen(inside, wanted_inside))
         _add_folder(new, _GPS_FOLDER, place if which == "all" else {})
         return new if len(new) and len(new.tobytes()) <= _LONGEST else None
-    except Exception:  # noqa: BLE001  broken EXIF raises nearly anything
+    except Exception:
         return None
 
 
@@ -60,7 +62,7 @@ def kept_of(photo: str | os.PathLike[str], which: str) -> Exif | None:
 
 
 def flat(exif: Exif) -> Exif:
-    """The same without folders, as the writer of compressed TIFF knows none; the date becomes that of the file."""
+    """The same without folders, as compressed TIFF cannot be given any; the date becomes that of the file."""
     date = exif.get_ifd(_EXIF_FOLDER).get(_DATE_TAKEN)
     for folder in (_EXIF_FOLDER, _GPS_FOLDER):
         exif.pop(folder, None)
@@ -78,4 +80,6 @@ def _add_folder(exif: Exif, folder: int, tags: dict[int, Any]) -> None:
 
 
 def _chosen(tags: dict[int, Any], wanted: frozenset[int] | None) -> dict[int, Any]:
-    return {tag: value for tag, value in tags.items() if tag not in _LAYOUT and (wanted is None or tag in wanted)}
+    return {
+        tag: value for tag, value in tags.items() if tag not in _LAYOUT and (wanted is None or tag in wanted)
+    }

@@ -1,4 +1,4 @@
-"""Drawings made for paper of a certain size: the largest sheet of the photo's proportions that a page holds."""
+"""Drawings for a page of paper: the largest sheet of the photo's proportions that the page holds."""
 
 import os
 from dataclasses import replace
@@ -24,8 +24,9 @@ _MM_PER_INCH = 25.4
 def fitted(settings: Settings, page: str | None, dpi: float | None, width: int, height: int) -> Settings:
     """Settings whose sheet fills a page, upright or turned, for a photo of width x height pixels.
 
-    Strokes keep their width in mm: a larger page has more of them. page: a name of PAGES, None leaves the sheet
-    as it is. dpi: pixels to the inch of paper; None with a page is 300, without one leaves the size as it is.
+    Strokes keep their width in mm: a larger page has more of them.
+    page: a name of PAGES; None leaves the sheet as it is.   dpi: pixels to the inch of paper; None means 300
+    with a page, and without one leaves the size as it is.
     """
     sheet_mm = settings.sheet_mm
     if page is not None:
@@ -36,7 +37,9 @@ def fitted(settings: Settings, page: str | None, dpi: float | None, width: int, 
     return replace(settings, sheet_mm=sheet_mm, size=size)
 
 
-def fitted_to(settings: Settings, page: str | None, dpi: float | None, photo: str | os.PathLike[str]) -> Settings:
+def fitted_to(
+    settings: Settings, page: str | None, dpi: float | None, photo: str | os.PathLike[str]
+) -> Settings:
     """As `fitted`, for a photo file."""
     if page is None and dpi is None:
         return settings

@@ -39,8 +39,12 @@ class Easel:
     def draw(self, strokes: Sequence[Stroke], progress: rub.Progress | None = None, share: float = 1.0) -> None:
         """Draw strokes, in order, onto what is there; slices give the same sheet, bit for bit."""
         drawn = 0
+
+        def report(done: int, _: int) -> None:
+            if progress:
+                progress(drawn + done, len(strokes))
+
         for part in self.watch(self, strokes, share) if self.watch else [strokes]:
-            report = progress and (lambda n, _, before=drawn: progress(before + n, len(strokes)))
             rub.rub(self.sheet, part, self.box, threads=self.threads, smears=self.smears, progress=report)
             drawn += len(part)
 

@@ -8,8 +8,7 @@ side. A tip worn flat is turned or sharpened: the next stroke gets a fresh mask.
 
 import functools
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from importlib import resources
 
 import numpy as np
@@ -24,8 +23,8 @@ from .wax import Physics, Sheet, _rub
 STEP = 0.14  # of the tip's width, between two contacts: below the wavelength of the bumps
 SHARPEN_UM = 36.0  # mean height lost before a tip is turned or sharpened
 WEAR_LEVELS = 3  # masks between sharp and worn
-FACES = 4  # different sets of bumps
-HEADINGS = 12  # directions in which the bumps are drawn out, over half a turn
+FACES = 3  # different sets of bumps
+HEADINGS = 9  # directions in which the bumps are drawn out, over half a turn
 
 Progress = Callable[[int, int], None]
 
@@ -102,7 +101,7 @@ def rub(
     mask_of = np.array([box.take(stroke, newton_mm, heading) for stroke, newton_mm, heading in drawn], np.int64)
     masks, sides = box.stacked()
     side_of = sides[mask_of]
-    level = schedule.levels(points, first, (side_of / 2 + 2).astype(np.float32), sheet.rows, sheet.cols)
+    order = schedule.order(points, first, (side_of / 2 + 2).astype(np.float32), sheet.rows, sheet.cols)
     cost = (cells / np.maximum(1, STEP * (side_of - 2)) + 1) * side_of**2
     loss = np.zeros(len(strokes), np.float64)
     constants = box.constants.constants(sheet.cell_mm)
@@ -112,14 +111,11 @@ def rub(
         _rub(picked, points, first, wax_of, mask_of, masks, sides, np.float32(STEP), smears, constants, per_lambda,
              sheet.rows, sheet.cols, *sheet.columns(), loss)  # fmt: skip
 
-    done = 0
-    with ThreadPoolExecutor(threads) as pool:
-        for members in _by_level(level):
-            parts = schedule.shares(members, cost, threads)
-            list((pool.map if len(parts) > 1 else map)(draw, parts))  # handing one part over would cost more
-            done += members.size
-            if progress:
-                progress(done, len(strokes))
+    def report(done: int) -> None:
+        if progress:
+            progress(done, len(strokes))
+
+    schedule.run(draw, order, cost, threads, report)
     for stroke, given in zip(strokes, loss * sheet.cell_mm**2 / 1000, strict=True):
         box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + float(given)
     return float(loss.sum())
@@ -152,9 +148,3 @@ def _headings(points: NDArray[np.float32], first: NDArray[np.int64]) -> NDArray[
     length = np.maximum(np.hypot(x, y), 1e-9)
     double = np.add.reduceat(((x * x - y * y) + 2j * x * y) / length, first[:-1])
     return np.round(np.angle(double) / 2 / np.pi * HEADINGS).astype(np.int64) % HEADINGS
-
-
-def _by_level(level: NDArray[np.int32]) -> Iterable[NDArray[np.int64]]:
-    """Strokes of each level, lowest first."""
-    order = np.argsort(level, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(level[order])) + 1)

@@ -29,12 +29,14 @@ DPI = 150
 A4_MM = (210.0, 297.0)
 MARGIN_MM, HEAD_MM, FOOT_MM = 12.0, 26.0, 10.0
 PALE = 0.35  # how much is left of what was drawn before
-FEW = 0.015  # of all wax: crayons that give less come together at the end
+FEW = 0.01  # of all wax: crayons that give less come together at the end
 LINES = ("line", "outline")  # notes of strokes that belong to the outline
 PLACE_MM = 1.5  # cells of the map of which crayon lies where
-SMALLEST_MM2 = 90.0  # a patch of colour smaller than this gets no outline
-PENCIL_TIP, PENCIL_N = Tip("sharp", 0.8), 0.16
+SMALLEST_MM2 = 200.0  # a patch of colour smaller than this gets no outline
+PENCIL_TIP, PENCIL_N = Tip("sharp", 1.1), 0.55
 SOLID_UM = 3.0  # film at which the wax hides about two thirds of the pale drawing below
+
+_NEAR = np.ones((3, 3), np.uint8)  # a cell and its neighbours
 
 Progress = Callable[[str, float], None]
 
@@ -138,10 +140,10 @@ def outline_of(drawing: Drawing, palette: Palette) -> list[Stroke]:
 
 
 def _grey(palette: Palette) -> str:
-    """The crayon nearest to a middle grey."""
+    """The crayon nearest to a dark grey."""
     codes = np.array([[int(c.hex[i : i + 2], 16) for i in (1, 3, 5)] for c in palette.crayons], np.uint8)
     lab = oklab(decode_srgb(codes[None])[0])
-    return palette.crayons[int(((lab - (0.62, 0, 0)) ** 2).sum(1).argmin())].name
+    return palette.crayons[int(((lab - (0.5, 0, 0)) ** 2).sum(1).argmin())].name
 
 
 def _pencil(path: NDArray[np.float32], crayon: str) -> Stroke:
@@ -169,7 +171,8 @@ def _borders(drawing: Drawing, palette: Palette) -> Iterator[NDArray[np.float32]
                 if (b - a) * PLACE_MM >= 6:
                     part = smooth[a:b] if known.any() else np.concatenate([smooth, smooth[:1]])
                     yield part.astype(np.float32)
-        drawn |= cv2.dilate(cv2.morphologyEx(mask, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)), np.ones((3, 3), np.uint8))
+        rim = cv2.morphologyEx(mask, cv2.MORPH_GRADIENT, _NEAR)
+        drawn = np.maximum(drawn, cv2.dilate(rim, _NEAR))
 
 
 def _smoothed(ring: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -195,11 +198,11 @@ def _places(drawing: Drawing, palette: Palette) -> NDArray[np.int32]:
         cv2.GaussianBlur(layer, (0, 0), 2.0, dst=layer)
     places = laid.argmax(0).astype(np.int32)
     for index in np.unique(places):
-        count, parts, stats, _ = cv2.connectedComponentsWithStats((places == index).astype(np.uint8), connectivity=4)
+        _, parts, stats, _ = cv2.connectedComponentsWithStats((places == index).astype(np.uint8), connectivity=4)
         small = np.flatnonzero(stats[:, cv2.CC_STAT_AREA] * PLACE_MM**2 < SMALLEST_MM2)
         for part in small[small > 0]:
             inside = (parts == part).astype(np.uint8)
-            around = places[(cv2.dilate(inside, np.ones((3, 3), np.uint8)) > 0) & (inside == 0)]
+            around = places[(cv2.dilate(inside, _NEAR) > 0) & (inside == 0)]
             if around.size:
                 places[inside > 0] = np.bincount(around).argmax()
     return places
@@ -252,7 +255,7 @@ class _Layout:
         page = lettering.picture()
         wide = page.shape[1] - 2 * self._px(MARGIN_MM)
         across = max(1, int((wide / self.pixels_mm - 2 * legend.MARGIN) // legend.ENTRY[0]))
-        high = self._px(legend.ENTRY[1] * -(-len(used) // across) + 2 * legend.MARGIN)
+        high = self._px(legend.ENTRY[1] * -(-len(used) // across) + 2 * legend.MARGIN - 4)
         box = legend.panel(drawing, used, wide, high, self.pixels_mm, "", across)
         top = self._px(MARGIN_MM + 14)
         self._paste(page, box, self._px(MARGIN_MM), top)
@@ -260,7 +263,7 @@ class _Layout:
         shrink = min(1.0, room[0] / picture.shape[1], room[1] / picture.shape[0])
         size = (max(1, int(picture.shape[1] * shrink)), max(1, int(picture.shape[0] * shrink)))
         small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-        self._paste(page, small, (page.shape[1] - size[0]) // 2, top + high + self._px(4))
+        self._paste(page, np.asarray(small, np.uint8), (page.shape[1] - size[0]) // 2, top + high + self._px(4))
         return page
 
     def page(self, drawing: Drawing, step: Step, number: int, steps: int, picture: Picture) -> Picture:
@@ -272,7 +275,8 @@ class _Layout:
         patches = 26.0 * len(step.crayons)
         lettering.write(MARGIN_MM + 20, MARGIN_MM - 5, step.title, 2.0, room - min(patches, room / 2))
         words = ", ".join(step.crayons) + ". " if len(step.crayons) > 1 or step.title not in step.crayons else ""
-        lettering.write(MARGIN_MM + 20, MARGIN_MM + 4.5, f"{words[:1].upper()}{words[1:]}{step.hint}", 1.1, room - patches)
+        words = f"{words[:1].upper()}{words[1:]}{step.hint}"
+        lettering.write(MARGIN_MM + 20, MARGIN_MM + 4.5, words, 1.1, room - patches)
         lettering.write(self.page_mm[0] / 2, self.page_mm[1] - FOOT_MM, f"{number} of {steps}", 0.9, anchor="mm")
         page = lettering.picture()
         for place, crayon in enumerate(step.crayons[:8]):
@@ -283,7 +287,8 @@ class _Layout:
 
     def _swatch(self, drawing: Drawing, crayon: str) -> Picture:
         """A patch of one crayon on its paper, 24 x 14 mm."""
-        return legend.scrap(drawing, [legend.patch(2, 2, 20, 10, crayon, 1.0)], self._px(24), self._px(14), 1 / self.pixels_mm)
+        patch = legend.patch(2, 2, 20, 10, crayon, 1.0)
+        return legend.scrap(drawing, [patch], self._px(24), self._px(14), 1 / self.pixels_mm)
 
     def _blank(self) -> Picture:
         return np.full((self._px(self.page_mm[1]), self._px(self.page_mm[0]), 3), 255, np.uint8)

@@ -70,7 +70,7 @@ def _path(stroke: Stroke) -> str:
     note = f" data-note={quoteattr(stroke.note)}"
     points = stroke.path_mm.astype(np.float64)
     if len(points) == 1:
-        points = np.concatenate([points, points + (DAB_MM, 0)])
+        points = np.concatenate([points, points + np.array([DAB_MM, 0])])
     return (f'<path stroke-width="{stroke.tip.width_mm:.4g}"{tip}{note} data-force="{_forces(stroke.force_n)}" '
             f'd="{_outline(points)}"/>\n')  # fmt: skip
 

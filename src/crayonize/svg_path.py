@@ -76,10 +76,8 @@ def outlines(data: str) -> list[Outline]:
     made: list[Outline] = []
     x = y = 0.0
     before, bend = "", (0.0, 0.0)  # the command before, and its last inner control point
-    count = 0
-    for letter, values in _commands(data):
-        count += 1
-        if count > MAX_SEGMENTS:
+    for count, (letter, values) in enumerate(_commands(data)):
+        if count >= MAX_SEGMENTS:
             raise ValueError(f"a path of more than {MAX_SEGMENTS:,} segments")
         command = letter.upper()
         if letter.islower():

@@ -31,6 +31,7 @@ _INHERITED = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity"
               "data-crayon", "data-tip", "data-angle", "data-note")  # fmt: skip
 _GROUPS = ("g", "a", "switch", "svg", "symbol", "use")
 _SHAPES = ("path", "line", "polyline", "polygon", "rect", "circle", "ellipse")
+_SIDES = ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "x1", "y1", "x2", "y2")
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s?([a-zA-Z%]*)")
 _CALL = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
 _TAKES = {"matrix": (6,), "translate": (1, 2), "scale": (1, 2), "rotate": (1, 3), "skewX": (1,), "skewY": (1,)}
@@ -87,15 +88,16 @@ def page(root: Element, long_mm: float) -> Page:
 def _fit(root: Element, long_mm: float) -> tuple[float, float, Floats] | None:
     """Width and height in mm, and the matrix from user units to mm; None if the file gives no size at all."""
     box = _view_box(root.attributes.get("viewBox"))
-    sizes = [_size(root, "width"), _size(root, "height")]
+    across, down = _size(root, "width"), _size(root, "height")
     if box is None:
-        if not all(sizes):
+        if not across or not down:
             return None
-        box = (0.0, 0.0, *(s[0] / PX_MM for s in sizes if s))
-    units = [s for s in sizes if s and s[1]]
-    if units:
-        missing = [box[3] / box[2], box[2] / box[3]]
-        width, height = (s[0] if s and s[1] else units[0][0] / missing[i] for i, s in enumerate(sizes))
+        box = (0.0, 0.0, across[0] / PX_MM, down[0] / PX_MM)
+    wide = across[0] if across and across[1] else None
+    high = down[0] if down and down[1] else None
+    if wide or high:
+        width = wide or (high or 0) * box[2] / box[3]
+        height = high or width * box[3] / box[2]
         if not SMALLEST_MM <= max(width, height) <= LARGEST_MM or min(width, height) < 1:
             raise ValueError(f"the sheet is {width:.4g} x {height:.4g} mm; its long side must be "
                              f"{SMALLEST_MM:g} to {LARGEST_MM:g} mm")  # fmt: skip
@@ -279,7 +281,8 @@ def _inner(element: Element) -> Floats:
     x, y = (_length(element.attributes.get(axis, "0")) if element.tag == "svg" else 0.0 for axis in "xy")
     if box is None:
         return _moved(x, y)
-    width, height = (_length(element.attributes.get(n, ""), s) for n, s in zip(("width", "height"), box[2:], strict=True))
+    width = _length(element.attributes.get("width", ""), box[2])
+    height = _length(element.attributes.get("height", ""), box[3])
     return _view_matrix(box, x, y, width, height, element.attributes.get("preserveAspectRatio", ""))
 
 
@@ -359,8 +362,9 @@ def _rgba(text: str) -> tuple[float, float, float, float] | None:
 
     text = text.strip().lower()
     if found := _RGB.fullmatch(text):
-        parts = [float(n) / (100 if unit else 255 if i < 3 else 1) for i, (n, unit) in enumerate(_PART.findall(found[1]))]
-        r, g, b, a = (min(max(part, 0.0), 1.0) for part in (*parts, 1.0)[:4])
+        full = (255, 255, 255, 1)
+        parts = [float(n) / (100 if unit else f) for f, (n, unit) in zip(full, _PART.findall(found[1]), strict=False)]
+        r, g, b, a = (min(part, 1.0) for part in (*parts, 1.0)[:4])
         return r, g, b, a
     try:
         codes = (*ImageColor.getrgb(text), 255)
@@ -384,7 +388,7 @@ def _path_data(element: Element) -> str:
         return given.get("d", "")
     if element.tag in ("polyline", "polygon"):
         return f"M{given.get('points', '')}" + ("Z" if element.tag == "polygon" else "")
-    value = {key: _length(text) for key, text in given.items() if key in ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "x1", "y1", "x2", "y2")}  # fmt: skip
+    value = {key: _length(given[key]) for key in _SIDES if key in given}
     get = value.get
     if element.tag == "line":
         return f"M{get('x1', 0)},{get('y1', 0)}L{get('x2', 0)},{get('y2', 0)}"

@@ -16,7 +16,6 @@ _GEOMETRY = ("d", "points", "data-force")
 _FETCHED = ("use", "image", "feImage", "script", "link")  # elements whose href would have to be fetched
 
 
-
 @dataclass
 class Element:
     """One element: its name and attributes without namespace, and what it holds."""
@@ -110,9 +109,8 @@ class _Reader:
 
     def _end(self, _: str) -> None:
         element = self.stack.pop()
-        if element.tag == "style":
-            if "@import" in element.text:
-                raise self._wrong("the style refers to something outside; nothing outside the file is read")
+        if element.tag == "style" and "@import" in element.text:
+            raise self._wrong("the style refers to something outside; nothing outside the file is read")
 
     def _text(self, text: str) -> None:
         if self.stack and self.stack[-1].tag == "style":

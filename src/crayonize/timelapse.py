@@ -33,7 +33,7 @@ FILL_MM_S, LINE_MM_S = 200.0, 60.0  # how fast a hand fills a plane, and draws a
 LINES = ("line", "detail", "outline")  # notes of strokes that are drawn slowly
 LIFT_S, DAB_S = 0.25, 0.1  # time from stroke to stroke, and for a dab
 TILE = 16  # pixels of the film that are renewed together
-SHADES = 4096  # steps of light in the table of sRGB codes
+SHADES = 32768  # steps of light in the table of sRGB codes
 
 Floats = NDArray[np.float32]
 Frame = NDArray[np.uint8]
@@ -56,7 +56,7 @@ class Timelapse:
     def __enter__(self) -> "Timelapse":
         return self
 
-    def __exit__(self, kind: object, *_: object) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         if self._writer and kind is not None:
             self._writer.abort()
         elif self._writer and self._view:
@@ -87,7 +87,8 @@ class Timelapse:
         if self._view is None:
             self._view = view = _View(easel)
             rows, cols = view.now.shape[:2]
-            reel = film.Reel(cols, rows, self.steps + 2, round(FIRST * film.FPS), round(LAST * film.FPS), _colours(easel))
+            first, last = round(FIRST * film.FPS), round(LAST * film.FPS)
+            reel = film.Reel(cols, rows, self.steps + 2, first, last, _colours(easel))
             self._writer = film.Writer(self.path, reel)
             self._writer.add(view.now.copy())
         return self._view
@@ -139,7 +140,7 @@ class _View:
         self.colours = {c.name: _rgb(c.hex) for c in easel.box.palette.crayons}
         self.light = easel.picture()
         self.now = np.empty((max(1, sheet.rows // self.factor), max(1, sheet.cols // self.factor), 3), np.uint8)
-        self.codes = encode_srgb(np.linspace(0, 1, SHADES * 8, dtype=np.float32)[None, :, None].repeat(3, 2))[0, :, 0].copy()
+        self.codes = encode_srgb(np.linspace(0, 1, SHADES, dtype=np.float32))
         _reduce(0, self.now.shape[0], 0, self.now.shape[1], self.factor, self.light, self.codes, self.now)
         self.before = self.now.copy()
 
@@ -147,13 +148,13 @@ class _View:
         """Look again where strokes have been drawn."""
         self.before[:] = self.now
         rows, cols = self.now.shape[:2]
-        pixels = [(t * TILE, min((t + 1) * TILE, rows), a * TILE, min(b * TILE, cols)) for t, a, b in self._runs(strokes)]
-        cells = [(top * self.factor, bottom * self.factor, left * self.factor, right * self.factor)
-                 for top, bottom, left, right in pixels]  # fmt: skip
-        easel = self.easel
+        easel, factor = self.easel, self.factor
+        parts = [(row * TILE, min((row + 1) * TILE, rows), first * TILE, min(end * TILE, cols))
+                 for row, first, end in self._runs(strokes)]  # fmt: skip
+        cells = [(top * factor, bottom * factor, left * factor, right * factor) for top, bottom, left, right in parts]
         optics.render_parts(easel.sheet, easel.ground, cells, self.light, threads=easel.threads)
-        for part in pixels:
-            _reduce(*part, self.factor, self.light, self.codes, self.now)
+        for part in parts:
+            _reduce(*part, factor, self.light, self.codes, self.now)
 
     def frame(self, stroke: Stroke | None, passed: float) -> Frame:
         """The sheet as it is while the crayon is on its way through `stroke`."""
@@ -182,9 +183,9 @@ class _View:
         """Rows of tiles that strokes touched: (row, first tile, tile after the last)."""
         cells = TILE * self.factor
         touched = np.zeros((-(-self.now.shape[0] // TILE), -(-self.now.shape[1] // TILE)), np.uint8)
-        points = [s.path_mm / self.easel.sheet.cell_mm for s in strokes]
-        reach = np.concatenate([np.full(len(p), _reach(s, self.easel.sheet)) for p, s in zip(points, strokes, strict=True)])
-        _touch(np.concatenate(points).astype(np.float32), np.cumsum([0, *map(len, points)]), reach, cells, touched)
+        points = np.concatenate([s.path_mm for s in strokes]) / np.float32(self.easel.sheet.cell_mm)
+        reach = np.array([_reach(s, self.easel.sheet) for s in strokes], np.float32)
+        _touch(points, np.cumsum([0, *(len(s.path_mm) for s in strokes)]), reach, cells, touched)
         edges = np.diff(np.pad(touched, ((0, 0), (1, 1))).astype(np.int8), axis=1)
         rows, first = np.nonzero(edges == 1)
         return list(zip(rows.tolist(), first.tolist(), np.nonzero(edges == -1)[1].tolist(), strict=True))
@@ -197,14 +198,14 @@ def _reach(stroke: Stroke, sheet: Sheet) -> float:
 
 @kernel
 def _touch(points, first, reach, tile, touched):  # type: ignore[no-untyped-def]
-    """Mark the tiles within reach of each path; points (n, 2) and reach (n,) in cells."""
+    """Mark the tiles within reach of each path; points (n, 2) and reach (paths,) in cells."""
     rows, cols = touched.shape
     for s in range(first.size - 1):
         for i in range(first[s], first[s + 1]):
             j = max(i - 1, first[s])
             dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
             parts = 1 + int(max(abs(dx), abs(dy)) / tile * 4)
-            r = reach[i] + tile / 8  # a path is sampled four times a tile
+            r = reach[s] + tile / 8  # a path is sampled four times a tile
             for p in range(parts):
                 t = (p + 1) / parts
                 x, y = points[j, 0] + t * dx, points[j, 1] + t * dy
@@ -225,7 +226,8 @@ def _reduce(top, bottom, left, right, factor, light, codes, out):  # type: ignor
                 for j in range(y * factor, (y + 1) * factor):
                     for i in range(x * factor, (x + 1) * factor):
                         total += light[j, i, c]
-                out[y, x, c] = codes[int(min(max(total * share, np.float32(0)), np.float32(1)) * steps + np.float32(0.5))]
+                mean = min(max(total * share, np.float32(0)), np.float32(1))
+                out[y, x, c] = codes[int(mean * steps + np.float32(0.5))]
 
 
 # ---- colours and the crayon in view ------------------------------------------------------------------------
@@ -268,7 +270,8 @@ def _draw_crayon(frame: Frame, tip: NDArray[np.float32], colour: tuple[int, int,
 
     def body(start: float, end: float, half_start: float, half_end: float, rgb: Sequence[float]) -> None:
         a, b = tip + axis * start, tip + axis * end
-        outline = np.array([a + across * half_start, a - across * half_start, b - across * half_end, b + across * half_end])
+        sides = across * half_start, across * half_end
+        outline = np.array([a + sides[0], a - sides[0], b - sides[1], b + sides[1]])
         points = np.round(outline * 16).astype(np.int32)
         cv2.fillPoly(frame, [points], rgb, cv2.LINE_AA, 4)
         cv2.polylines(frame, [points], True, [c * 0.55 for c in rgb], 1, cv2.LINE_AA, 4)

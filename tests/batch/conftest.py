@@ -1,4 +1,4 @@
-"""A folder of small photos, a batch over it in a process of its own, and the promises checked after every fault."""
+"""A folder of small photos, a batch over it in a process of its own, and what must hold after every fault."""
 
 import hashlib
 import json
@@ -19,7 +19,9 @@ from PIL import Image
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-_CALM: dict[tuple[tuple[str, str], ...], dict[str, str]] = {}  # photos -> what an undisturbed run makes of them
+_CALM: dict[
+    tuple[tuple[str, str], ...], dict[str, str]
+] = {}  # photos -> what an undisturbed run makes of them
 STATUSES = {"ok", "failed", "died", "timeout", "skipped", "ignored", "not_run"}
 
 
@@ -43,11 +45,14 @@ def tree(folder: Path) -> dict[str, str]:
 class Batch:
     """One run of the command in its own session, under observation."""
 
-    def __init__(self, inputs: list[Path], output: Path, words: list[str], prefix: list[str], **how: Any) -> None:
+    def __init__(
+        self, inputs: list[Path], output: Path, words: list[str], prefix: list[str], **how: Any
+    ) -> None:
         path = os.pathsep.join(map(str, (ROOT / "src", ROOT, HERE)))
         self.output = output
         self.process = subprocess.Popen(
-            [*prefix, sys.executable, str(HERE / "drive.py"), *map(str, inputs), "-o", str(output), "--json", *words],
+            [*prefix, sys.executable, str(HERE / "drive.py"), *map(str, inputs), "-o", str(output),
+             "--json", *words],
             **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True,
                "env": {**os.environ, "PYTHONPATH": path}, **how},
         )  # fmt: skip
@@ -125,7 +130,9 @@ class Desk:
             photo(self.photos / f"{i % 3}" / f"p{i:04}{name}", i % 10)
         return self
 
-    def start(self, *words: str, prefix: list[str] | None = None, output: Path | None = None, **how: Any) -> Batch:
+    def start(
+        self, *words: str, prefix: list[str] | None = None, output: Path | None = None, **how: Any
+    ) -> Batch:
         """Start a batch."""
         if self._before is None:
             self._before = tree(self.photos)
@@ -152,7 +159,7 @@ class Desk:
         check_whole(self.pictures)
 
     def finish(self, total: int) -> Batch:
-        """Run once more: everything is done at the end, as by a run that nothing disturbed, and then at rest."""
+        """Run once more: then everything is done, as by a run that nothing disturbed."""
         again = self.run()
         assert again.process.returncode == 0, again.said
         assert again.count("ok") + again.count("skipped") == total

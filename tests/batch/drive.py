@@ -1,4 +1,4 @@
-"""Runs a batch as the command does, with the stand-in for the sketcher: drive.py INPUT... -o OUTPUT [options]."""
+"""Runs a batch as the command does, with the stand-in for the sketcher: drive.py INPUT... -o OUTPUT ..."""
 
 import argparse
 import sys
@@ -17,7 +17,10 @@ if __name__ == "__main__":
     batch.add_options(parser)
     words = parser.parse_args()
     recipe = batch.Recipe(
-        Settings(size=64, seed=words.seed), metadata=words.metadata, max_pixels=words.max_pixels, max_bytes=words.max_bytes
+        Settings(size=64, seed=words.seed),
+        metadata=words.metadata,
+        max_pixels=words.max_pixels,
+        max_bytes=words.max_bytes,
     )
     try:
         sys.exit(batch.run(words.inputs, words.output, batch.options_of(words), recipe,

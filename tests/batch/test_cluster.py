@@ -32,22 +32,25 @@ class Cluster:
             assert time.monotonic() < end
             time.sleep(0.05)
         self.address = json.loads(told.read_text())["address"]
-        self.workers = [self._start("worker", self.address, "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1",
-                                    "--local-directory", str(base / f"w{i}")) for i in range(2)]  # fmt: skip
+        places = [str(base / f"w{i}") for i in range(2)]
+        words = ["worker", self.address, "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1"]
+        self.workers = [self._start(*words, "--local-directory", place) for place in places]
 
     def _start(self, *words: str) -> subprocess.Popen[bytes]:
         process = subprocess.Popen(
-            [sys.executable, "-m", "dask", *words], env={**os.environ, "PYTHONPATH": PATH}, start_new_session=True,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            [sys.executable, "-m", "dask", *words],
+            env={**os.environ, "PYTHONPATH": PATH},
+            start_new_session=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         self._all.append(process)
         return process
 
     def kill(self, process: subprocess.Popen[bytes]) -> None:
         """As a machine that loses its power: all of a session at once."""
         for one in (process.pid, *_session(process.pid)):
-            with_ = psutil.pid_exists(one)
-            if with_:
+            if psutil.pid_exists(one):
                 os.kill(one, signal.SIGKILL)
         process.wait()
 

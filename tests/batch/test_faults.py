@@ -33,7 +33,9 @@ def test_a_killed_worker_costs_nothing(desk: Desk, dice: random.Random, chance: 
 
 
 @pytest.mark.parametrize("chance", range(10))
-def test_after_a_killed_parent_the_next_run_does_the_rest(desk: Desk, dice: random.Random, chance: int) -> None:
+def test_after_a_killed_parent_the_next_run_does_the_rest(
+    desk: Desk, dice: random.Random, chance: int
+) -> None:
     run = desk.fill(PHOTOS, 0.02).start()
     run.wait_until(run.begun(chance + 1))
     time.sleep(dice.random() * 0.05)
@@ -157,7 +159,9 @@ def test_a_full_disk_stops_the_run(desk: Desk, size: str, inodes: int) -> None:
     for i in range(60):
         photo(desk.photos / f"{i:02}.png", i, (90, 70))
     desk.pictures.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size},nr_inodes={inodes}", "x", desk.pictures], check=True)
+    subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={size},nr_inodes={inodes}", "x", desk.pictures], check=True
+    )
     try:
         old = photo(desk.pictures / "keep.png", 3).read_bytes()
         begun = time.monotonic()
@@ -294,6 +298,13 @@ def test_photos_may_go_grow_or_change_on_the_way(desk: Desk) -> None:
     os.replace(photo(desk.base / "other.png", 9), desk.photos / "z-swap.png")
     desk._before = tree(desk.photos)
     assert run.end() == 3
-    assert [run.status(f"z-{name}.png") for name in ("go", "grow", "shrink", "swap")] == ["failed", "ok", "failed", "ok"]
+    assert [run.status(f"z-{name}.png") for name in ("go", "grow", "shrink", "swap")] == [
+        "failed",
+        "ok",
+        "failed",
+        "ok",
+    ]
     again = desk.run()
-    assert again.status("z-grow.png") == again.status("z-swap.png") == "ok", "they were noted as they were before"
+    assert again.status("z-grow.png") == again.status("z-swap.png") == "ok", (
+        "they were noted as they were before"
+    )

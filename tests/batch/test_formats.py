@@ -25,8 +25,15 @@ def told(path: Path) -> dict[str, Any]:
         title = exif.get(40091)
         if isinstance(title, tuple):
             title = bytes(title)
-        return {"artist": exif.get(315), "copyright": exif.get(33432), "camera": exif.get(271), "turn": exif.get(274),
-                "title": title and title.decode("utf-16-le").strip("\0"), "date": inside.get(36867) or exif.get(306), "place": place}  # fmt: skip
+        return {
+            "artist": exif.get(315),
+            "copyright": exif.get(33432),
+            "camera": exif.get(271),
+            "turn": exif.get(274),
+            "title": title and title.decode("utf-16-le").strip("\0"),
+            "date": inside.get(36867) or exif.get(306),
+            "place": place,
+        }
 
 
 @pytest.fixture
@@ -34,8 +41,12 @@ def memory_photo(desk: Desk) -> Path:
     """A photo with a story, lying on its side."""
     path = photo(desk.photos / "a.jpg")
     exif = Image.Exif()
-    exif.update({270: "Grandma", 315: "Me", 33432: "Mine", 271: "Camera", 274: 6, 256: 999, 34675: b"no profile"})
-    exif.get_ifd(EXIF_FOLDER).update({36867: "2020:02:03 04:05:06", 37500: b"maker", 40962: 999, 40961: 65535})
+    exif.update(
+        {270: "Grandma", 315: "Me", 33432: "Mine", 271: "Camera", 274: 6, 256: 999, 34675: b"no profile"}
+    )
+    exif.get_ifd(EXIF_FOLDER).update(
+        {36867: "2020:02:03 04:05:06", 37500: b"maker", 40962: 999, 40961: 65535}
+    )
     exif.get_ifd(GPS_FOLDER).update({1: "N", 2: (1.0, 2.0, 3.0)})
     with Image.open(path) as picture:
         picture.load()
@@ -77,10 +88,14 @@ def test_damaged_or_endless_metadata_is_left_out(desk: Desk, memory_photo: Path)
 
 @pytest.mark.parametrize(
     "page, dpi, shape, wanted",
-    [("a4", 300, (4000, 2000), (297, 3508)), ("a4", None, (3000, 4000), (280, 3307)), ("a4", 150, (10, 10), (210, 1240)),
-     ("letter", 300, (4, 3), (279.4, 3300)), (None, 100, (3, 2), (297, 1169)), (None, None, (3, 2), (297, 1600))],
+    [("a4", 300, (4000, 2000), (297, 3508)), ("a4", None, (3000, 4000), (280, 3307)), ("a4", 150, (10,
+     10), (210, 1240)),
+     ("letter", 300, (4, 3), (279.4, 3300)), (None, 100, (3, 2), (297, 1169)), (None, None, (3, 2), (297,
+     1600))],
 )  # fmt: skip
-def test_pages(page: str | None, dpi: float | None, shape: tuple[int, int], wanted: tuple[float, int]) -> None:
+def test_pages(
+    page: str | None, dpi: float | None, shape: tuple[int, int], wanted: tuple[float, int]
+) -> None:
     settings = fitted(Settings(), page, dpi, *shape)
     assert (settings.sheet_mm, settings.size) == pytest.approx(wanted)
 

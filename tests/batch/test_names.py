@@ -14,17 +14,45 @@ from crayonize.batch.names import check_template, folded, picture_name
 from crayonize.settings import Settings
 
 ODD_NAMES = [
-    b"plain.png", b"with space.png", b" leading.png", b"trailing .png", b"two..dots.png", b"UPPER.PNG", b"mixed.Png",
-    "größe.png".encode(), "日本語.png".encode(), "\U0001f58d.png".encode(), "e\u0301.png".encode(), b"new\nline.png",
-    b"tab\t.png", b"quote'\".png", b"back\\slash.png", b"-dash.png", b"--option.png", b"star*?.png", b"percent%20%s{0}.png",
-    b"{stem}.png", b"\xff\xfe.png", b"half\xc3.png", b"\x1b[31mred.png", b"semi;$(x)`y`.png", b"con.png", b"#@!&.png",
-]  # fmt: skip
+    b"plain.png",
+    b"with space.png",
+    b" leading.png",
+    b"trailing .png",
+    b"two..dots.png",
+    b"UPPER.PNG",
+    b"mixed.Png",
+    "größe.png".encode(),
+    "日本語.png".encode(),
+    "\U0001f58d.png".encode(),
+    "e\u0301.png".encode(),
+    b"new\nline.png",
+    b"tab\t.png",
+    b"quote'\".png",
+    b"back\\slash.png",
+    b"-dash.png",
+    b"--option.png",
+    b"star*?.png",
+    b"percent%20%s{0}.png",
+    b"{stem}.png",
+    b"\xff\xfe.png",
+    b"half\xc3.png",
+    b"\x1b[31mred.png",
+    b"semi;$(x)`y`.png",
+    b"con.png",
+    b"#@!&.png",
+]
 
 
 def refused(inputs: list[Path], output: Path, **options: object) -> str:
     """Why a batch is refused."""
     with pytest.raises(ValueError) as caught:
-        run([str(path) for path in inputs], str(output), Options(**options), Recipe(Settings()), render="stand_in:sketch")
+        run(
+            [str(path) for path in inputs],
+            str(output),
+            Options(**options),
+            Recipe(Settings()),
+            render="stand_in:sketch",
+        )
     assert not output.exists() or ".crayonize" not in os.listdir(output), "nothing is written before"
     return str(caught.value)
 
@@ -101,9 +129,15 @@ def test_what_is_no_ordinary_photo_is_told_and_left(desk: Desk) -> None:
 
 @pytest.mark.parametrize(
     "names",
-    [("a.jpg", "a.png"), ("A.png", "a.png"), ("é.png", "e\u0301.png"), ("x/a.jpg", "X/a.jpg"), ("ß.png", "SS.png"),
-     ("a.jpg", "a.png/b.png")],
-)  # fmt: skip
+    [
+        ("a.jpg", "a.png"),
+        ("A.png", "a.png"),
+        ("é.png", "e\u0301.png"),
+        ("x/a.jpg", "X/a.jpg"),
+        ("ß.png", "SS.png"),
+        ("a.jpg", "a.png/b.png"),
+    ],
+)
 def test_two_photos_for_one_place_are_refused(desk: Desk, names: tuple[str, str]) -> None:
     for name in names:
         photo(desk.photos / name)
@@ -170,13 +204,27 @@ def test_patterns_and_named_links_and_files(desk: Desk) -> None:
     photo(desk.photos / "b.png").rename(desk.photos / "b.odd")
     (desk.photos / "c.png").symlink_to(desk.photos / "a1.png")
     names = [str(desk.photos / name) for name in ("a*.png", "b.odd", "c.png", "a1.png")]
-    assert run(names, str(desk.pictures), Options(quiet=True), Recipe(Settings()), render="stand_in:sketch") == 0
+    assert (
+        run(names, str(desk.pictures), Options(quiet=True), Recipe(Settings()), render="stand_in:sketch") == 0
+    )
     assert set(tree(desk.pictures)) == {"a1.png", "a2.png", "b.png", "c.png"}
     assert "no such" in refused([desk.photos / "z*.png"], desk.base / "more")
 
 
 @pytest.mark.parametrize(
-    "template", ["", "x", "{stem", "{nothing}", "{stem.__class__}", "{stem!r}", "{stem:>9}", "../{stem}", "a/{stem}", "{0}{stem}"]
+    "template",
+    [
+        "",
+        "x",
+        "{stem",
+        "{nothing}",
+        "{stem.__class__}",
+        "{stem!r}",
+        "{stem:>9}",
+        "../{stem}",
+        "a/{stem}",
+        "{0}{stem}",
+    ],
 )
 def test_templates_that_are_refused(template: str) -> None:
     with pytest.raises(ValueError, match="--name"):

@@ -48,7 +48,9 @@ def test_auto_draws_again_with_other_settings(desk: Desk) -> None:
     assert desk.run().count("ok") == 4
 
 
-@pytest.mark.parametrize("existing, code, counts", [("skip", 0, (2, 4)), ("overwrite", 0, (6, 0)), ("fail", 2, None)])
+@pytest.mark.parametrize(
+    "existing, code, counts", [("skip", 0, (2, 4)), ("overwrite", 0, (6, 0)), ("fail", 2, None)]
+)
 def test_existing(desk: Desk, existing: str, code: int, counts: tuple[int, int] | None) -> None:
     desk.fill(6).run()
     for path in list(desk.pictures.rglob("*.png"))[:2]:
@@ -151,6 +153,9 @@ def test_the_journal_keeps_any_name(tmp_path: Path) -> None:
     job = Job(Found(name, name, "", 5, "6"), name, "")
     journal = Journal(tmp_path / "j", [], "r")
     journal.add(job, 10)
-    for again, done in ((Journal(tmp_path / "j", [], "r"), True), (Journal(tmp_path / "j", [], "other"), False)):
+    for again, done in (
+        (Journal(tmp_path / "j", [], "r"), True),
+        (Journal(tmp_path / "j", [], "other"), False),
+    ):
         assert again.knows(name) and again.is_done(job, 10) is done
         assert not again.is_done(job, 11) and not again.is_done(job, None)

@@ -8,7 +8,16 @@ from .job import Recipe
 from .options import Options, add_options, check_alone, inputs_and_output, options_of
 from .run import run
 
-__all__ = ["Options", "Recipe", "add_options", "check_alone", "inputs_and_output", "options_of", "run", "run_parsed"]
+__all__ = [
+    "Options",
+    "Recipe",
+    "add_options",
+    "check_alone",
+    "inputs_and_output",
+    "options_of",
+    "run",
+    "run_parsed",
+]
 
 
 def run_parsed(inputs: Sequence[str], output: str, parsed: argparse.Namespace, settings: Settings) -> int:

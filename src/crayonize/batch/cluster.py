@@ -5,6 +5,7 @@ memory limits and crashes are what they are at home; a machine that is lost has 
 """
 
 import json
+import logging
 import os
 import queue
 import threading
@@ -21,9 +22,10 @@ from .memory import available_bytes
 from .output import OutputFolder
 from .remote import is_remote
 
-_CONNECTING = 30.0  # s
+_CONNECTING = 10.0  # s
 _AHEAD = 2  # jobs sent for each thread of the cluster
 _LOST = 60.0  # s without a cluster after which it is given up
+_LOST_TEXT = "the cluster is lost; run the same again when it is back"
 
 _crews: dict[tuple[str, int], Crew] = {}  # on the cluster: recipe and thread -> crew
 
@@ -57,6 +59,7 @@ class Cluster:
             distributed: Any = import_module("distributed")
         except ImportError as error:
             raise ImportError('--dask needs more: pip install "crayonize[cluster]"') from error
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told by us
         self._client = distributed.Client(address, timeout=_CONNECTING, set_as_default=False)
         self._hello: Message = {"recipe": _absolute_files(recipe).to_json(), "render": render}
         self._time_limit = time_limit
@@ -70,17 +73,19 @@ class Cluster:
         exhausted = False
         while True:
             exhausted = self._stop_at is not None or not self._send(jobs, pending) or exhausted
-            if (exhausted and not pending) or (self._stop_at is not None and time.monotonic() > self._stop_at):
+            if (exhausted and not pending) or (
+                self._stop_at is not None and time.monotonic() > self._stop_at
+            ):
                 return
             try:
                 future = self._inbox.get(timeout=1.0 if self._stop_at is None else 0.1)
             except queue.Empty:
                 lost_since = None if self._client.status == "running" else lost_since or time.monotonic()
                 if self._client.status == "closed" or (lost_since and time.monotonic() - lost_since > _LOST):
-                    raise CrewError("the cluster is lost") from None
+                    raise CrewError(_LOST_TEXT) from None
                 continue
             if future in pending:
-                yield pending.pop(future), _outcome(future)
+                yield pending.pop(future), self._outcome(future)
 
     def _send(self, jobs: Iterator[Job | None], pending: dict[Any, Job]) -> bool:
         """Send some jobs ahead; False when there are no more."""
@@ -91,10 +96,22 @@ class Cluster:
                 return False
             if job is None:
                 break
-            future = self._client.submit(draw, self._hello, self._time_limit, asdict(_absolute(job)), pure=False)
+            future = self._client.submit(
+                draw, self._hello, self._time_limit, asdict(_absolute(job)), pure=False
+            )
             pending[future] = job
             future.add_done_callback(self._inbox.put)
         return True
+
+    def _outcome(self, future: Any) -> Outcome:
+        """What became of a job; CrewError if the cluster can do none."""
+        try:
+            return Outcome(**future.result())
+        except import_module("distributed").KilledWorker:
+            return Outcome("died", "several machines or workers of the cluster died of it")
+        except Exception as error:  # whatever a cluster of another version may raise
+            lost = self._client.status != "running"
+            raise CrewError(_LOST_TEXT if lost else f"the cluster cannot draw: {error}") from error
 
     def stop(self, now: bool = False) -> None:
         """End soon, or now. Pictures in work on the cluster are finished there."""
@@ -109,7 +126,7 @@ class Cluster:
 
 
 def _absolute_files(recipe: Recipe) -> Recipe:
-    """The same recipe for someone who stands in another folder, with one thread a job if nothing else is said."""
+    """The same recipe for someone who stands in another folder; one thread a job if nothing else is said."""
     changes: dict[str, Any] = {"threads": recipe.settings.threads or 1}
     for name in ("palette", "paper", "style"):
         value = getattr(recipe.settings, name)
@@ -123,13 +140,3 @@ def _absolute(job: Job) -> Job:
     source, target = job.photo.source, job.target
     photo = replace(job.photo, source=source if is_remote(source) else str(Path(source).absolute()))
     return replace(job, photo=photo, target=target if is_remote(target) else str(Path(target).absolute()))
-
-
-def _outcome(future: Any) -> Outcome:
-    """What became of a job; CrewError if the cluster can do none."""
-    try:
-        return Outcome(**future.result())
-    except import_module("distributed").KilledWorker:
-        return Outcome("died", "several machines or workers of the cluster died of it")
-    except Exception as error:  # whatever a cluster of another version may raise
-        raise CrewError(f"the cluster cannot draw: {error}") from error

@@ -1,6 +1,6 @@
 """The crew: worker processes that draw, and the foreman here who hands out jobs and outlives every accident.
 
-Each worker has one job at a time and pipes of its own, so that its death costs that one job and disturbs nobody
+Each worker has one job at a time and pipes of its own, so that its death costs that one job and nobody
 else's. A reader thread a worker turns all that happens into events in one inbox; only the foreman acts on
 them. Time limits are kept here, by killing: nothing inside a worker that hangs could keep them. A worker
 asks for memory before it opens a photo and waits until there is enough.
@@ -81,7 +81,9 @@ class Crew:
     memory: int | None = None  # bytes there are; several workers together take only a share of them
     clean_up: Callable[[Job, int], None] = lambda job, pid: None  # called for the job of a killed worker
     _hands: list[_Hand] = field(default_factory=list)
-    _inbox: "queue.SimpleQueue[tuple[_Hand | None, Message | None]]" = field(default_factory=queue.SimpleQueue)
+    _inbox: "queue.SimpleQueue[tuple[_Hand | None, Message | None]]" = field(
+        default_factory=queue.SimpleQueue
+    )
     _waiting: deque[Job] = field(default_factory=deque)
     _asking: dict[_Hand, int] = field(default_factory=dict)  # who waits for how many bytes, in order
     _deaths: dict[Job, int] = field(default_factory=dict)

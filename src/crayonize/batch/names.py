@@ -1,4 +1,4 @@
-"""Where each picture goes: the tree of the photos mirrored, names by a template, no two pictures at one place.
+"""Where each picture goes: the tree of the photos mirrored, names by a template, no two at one place.
 
 Two names that differ only in upper and lower case, or only in how an accented letter is put together, are one
 name on many disks. They are taken as one everywhere, so that a batch that works here works there too.
@@ -23,7 +23,9 @@ def check_template(template: str, more: Iterable[str] = ()) -> None:
         raise ValueError(f"--name {template!r}: {error}") from error
     for text, field, spec, conversion in parts:
         if "/" in text or "\\" in text:
-            raise ValueError(f"--name {template!r}: is a name without folders; the folders are those of the photos")
+            raise ValueError(
+                f"--name {template!r}: is a name without folders; the folders are those of the photos"
+            )
         if field is not None and (field not in fields or spec or conversion):
             raise ValueError(f"--name {template!r}: knows the fields {', '.join(f'{{{f}}}' for f in fields)}")
     if not {"stem", "name"} & {field for _, field, _, _ in parts}:
@@ -33,7 +35,13 @@ def check_template(template: str, more: Iterable[str] = ()) -> None:
 def picture_name(name: str, template: str, suffix: str, more: Mapping[str, str]) -> str:
     """The picture's name for a photo's name, both relative to their folders."""
     path = PurePosixPath(name)
-    values = {"stem": path.stem, "name": path.name, "suffix": path.suffix[1:], "parent": path.parent.name, **more}
+    values = {
+        "stem": path.stem,
+        "name": path.name,
+        "suffix": path.suffix[1:],
+        "parent": path.parent.name,
+        **more,
+    }
     return str(path.parent / (template.format_map(values) + suffix))
 
 

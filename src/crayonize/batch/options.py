@@ -37,16 +37,32 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add = group.add_argument
     add("-o", "--output", metavar="FOLDER", help="where the pictures go; made if need be")
     add("-j", "--jobs", type=_count, metavar="N", help="photos drawn at once (as cores and memory allow)")
-    add("--existing", choices=EXISTING, default="auto",
-        help="pictures already there: auto draws anew what has changed, and so goes on after a break (%(default)s)")
+    add(
+        "--existing",
+        choices=EXISTING,
+        default="auto",
+        help="pictures already there: auto draws what has changed, so it goes on after a break (%(default)s)",
+    )
     add("--format", choices=FORMATS, default="png", help="of the pictures (%(default)s)")
-    add("--name", default="{stem}", metavar="TEMPLATE",
-        help="name of a picture, such as \"{stem}.crayon\", of {stem}, {name}, {suffix}, {parent}, {palette}, "
-        "{paper}, {style}, {seed} (%(default)s)")
+    add(
+        "--name",
+        default="{stem}",
+        metavar="TEMPLATE",
+        help='name of a picture, such as "{stem}.crayon", of {stem}, {name}, {suffix}, {parent}, {palette}, '
+        "{paper}, {style}, {seed} (%(default)s)",
+    )
     add("--shard", type=_shard, metavar="I/N", help="only the I-th of N parts, for runs on several machines")
     add("--dry-run", action="store_true", help="only tell what would be done")
-    add("--json", action="store_true", help="one JSON line a file on stdout, and one at the end that counts them")
-    add("--watch", action="store_true", help="stay, and draw each photo that is put into the folder, until Ctrl-C")
+    add(
+        "--json",
+        action="store_true",
+        help="one JSON line a file on stdout, and one at the end that counts them",
+    )
+    add(
+        "--watch",
+        action="store_true",
+        help="stay, and draw each photo that is put into the folder, until Ctrl-C",
+    )
     add("--dask", metavar="URL", help="draw on this Dask cluster, such as tcp://scheduler:8786")
     add("--max-pixels", type=_amount, default=MAX_PIXELS, metavar="N", help="refuse larger photos (250M)")
     add("--max-bytes", type=_amount, default=MAX_BYTES, metavar="N", help="refuse larger files (1G)")
@@ -56,7 +72,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def options_of(parsed: argparse.Namespace) -> Options:
     """The options among all that was parsed."""
-    known: dict[str, Any] = {f.name: getattr(parsed, f.name) for f in fields(Options) if hasattr(parsed, f.name)}
+    known: dict[str, Any] = {
+        f.name: getattr(parsed, f.name) for f in fields(Options) if hasattr(parsed, f.name)
+    }
     return Options(**known)
 
 

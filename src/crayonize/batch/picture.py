@@ -28,7 +28,7 @@ class Studio:
     """Everything that is set up once and used for every photo."""
 
     def __init__(self, recipe: Recipe, render: str | None) -> None:
-        """render: "module:function" that stands in for `api.sketch`. ValueError for settings that are none."""
+        """render: "module:function" in place of `api.sketch`. ValueError for settings that are none."""
         self._recipe = recipe
         if render is None:
             _check(recipe)
@@ -45,7 +45,9 @@ class Studio:
         except ValueError as error:
             return Outcome("failed", str(error))
         except MemoryError:
-            return Outcome("failed", "there is not enough memory for it; choose a smaller --size or fewer --jobs")
+            return Outcome(
+                "failed", "there is not enough memory for it; choose a smaller --size or fewer --jobs"
+            )
         except OutputError:
             raise
         except SendError as error:
@@ -57,14 +59,18 @@ class Studio:
 
     def _make(self, job: Job, ask: Ask) -> Outcome:
         if job.photo.size > self._recipe.max_bytes:
-            raise ValueError(f"has {job.photo.size} bytes; the limit is {self._recipe.max_bytes} (--max-bytes)")
+            raise ValueError(
+                f"has {job.photo.size} bytes; the limit is {self._recipe.max_bytes} (--max-bytes)"
+            )
         with local_copy(job) as (source, target):
             return self._draw(job, source, target, ask)
 
     def _draw(self, job: Job, source: str, target: Path, ask: Ask) -> Outcome:
         settings, kept, needed = self._look_at(source)
         if not ask(needed):
-            raise ValueError(f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first")
+            raise ValueError(
+                f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first"
+            )
         if same_file(source, target):
             raise ValueError("its picture would take its own place; choose another output folder")
         if job.strange and not _is_ours(target):
@@ -89,7 +95,9 @@ class Studio:
         with open_picture(source) as (picture, _):
             width, height = picture.size
             if width * height > recipe.max_pixels:
-                raise ValueError(f"has {width * height} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
+                raise ValueError(
+                    f"has {width * height} pixels; the limit is {recipe.max_pixels} (--max-pixels)"
+                )
             settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, width, height)
             deep = ";16" in repr(getattr(picture, "tile", ""))
             needed = memory.need(str(picture.format), width * height, settings.size, deep)

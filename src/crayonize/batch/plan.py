@@ -125,7 +125,9 @@ def check_apart(paths: Sequence[str], output: str, jobs: Sequence[Job]) -> None:
     photos = {folded(os.path.realpath(path)) for path in files} | {folded(_place(path)) for path in files}
     for path in folders:
         if _lies_in(output, path) or _lies_in(path, output):
-            raise ValueError(f"{output!r} and {path!r} lie in one another; photos and pictures need two folders")
+            raise ValueError(
+                f"{output!r} and {path!r} lie in one another; photos and pictures need two folders"
+            )
     places = {target: os.path.realpath(target) for target in {os.path.dirname(job.target) for job in jobs}}
     for target in places:
         for path in folders:
@@ -140,7 +142,9 @@ def check_apart(paths: Sequence[str], output: str, jobs: Sequence[Job]) -> None:
 def _check_urls_apart(paths: Sequence[str], output: str) -> None:
     for path in paths:
         if is_remote(path) and remote.lie_in_one_another(path, output):
-            raise ValueError(f"{output!r} and {path!r} lie in one another; photos and pictures need two folders")
+            raise ValueError(
+                f"{output!r} and {path!r} lie in one another; photos and pictures need two folders"
+            )
 
 
 def _lies_in(inner: str, outer: str) -> bool:

@@ -20,7 +20,15 @@ from .output import STATE, OutputFolder
 from .scan import Entry, ignored_name, is_picture
 
 _PREFIX = "crayonize-"  # of temporary folders: crayonize-PID-...
-_STORES = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az"}  # know no folders; to make one would make a bucket
+_STORES = {
+    "s3",
+    "s3a",
+    "gs",
+    "gcs",
+    "abfs",
+    "abfss",
+    "az",
+}  # know no folders; to make one would make a bucket
 _SAVE_EVERY = 30.0  # s between two copies of the journal to the remote folder
 _VERSIONS = ("ETag", "etag", "md5Hash", "mtime", "LastModified", "last_modified", "updated", "created")
 
@@ -65,7 +73,9 @@ def _version(info: dict[str, Any]) -> str:
 
 def lie_in_one_another(one: str, other: str) -> bool:
     """Whether one URL names a folder in the other, or both the same."""
-    names = [f"{system.unstrip_protocol(path).rstrip('/')}/" for system, path in map(file_system, (one, other))]
+    names = [
+        f"{system.unstrip_protocol(path).rstrip('/')}/" for system, path in map(file_system, (one, other))
+    ]
     return names[0].startswith(names[1]) or names[1].startswith(names[0])
 
 

@@ -69,7 +69,9 @@ class Report:
         """Tell of one file. ReportError if that is not possible."""
         self.counts[outcome.status] += 1
         if self._json:
-            line: dict[str, Any] = _named("in", name) | (_named("out", out) if out else {}) | {"status": outcome.status}
+            line: dict[str, Any] = (
+                _named("in", name) | (_named("out", out) if out else {}) | {"status": outcome.status}
+            )
             if outcome.status == "ok":
                 line |= {"strokes": outcome.strokes, "bytes": outcome.bytes}
             if outcome.seconds:

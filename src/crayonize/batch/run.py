@@ -110,7 +110,7 @@ def _draw(crew: Workers, jobs: Iterator[Job | None], plan: Plan, folder: OutputF
 
 def _workers(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
              render: str | None, memory_limit: int | None) -> Workers:  # fmt: skip
-    """A cluster, or here as many workers as are asked for or as there are cores and memory; none of them idle."""
+    """A cluster, or as many workers here as are asked for, or as there are cores and memory; none idle."""
     if options.dask:
         return Cluster(options.dask, recipe, render, options.time_limit)
     available = memory.available_bytes() if memory_limit is None else memory_limit
@@ -135,7 +135,9 @@ def _stopped_by_signals(crew: Workers) -> Iterator[list[int]]:
     names = ("SIGINT", "SIGTERM", "SIGHUP")
     before = {}
     with suppress(ValueError):  # not in the main thread: whoever is there will care
-        before = {number: signal.signal(number, stop) for name in names if (number := getattr(signal, name, None))}
+        before = {
+            number: signal.signal(number, stop) for name in names if (number := getattr(signal, name, None))
+        }
     try:
         yield came
     finally:

@@ -14,7 +14,9 @@ from .job import Found, Outcome
 SUFFIXES = frozenset((".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".webp", ".tif", ".tiff", ".avif",
                       ".heic", ".heif", ".hif"))  # fmt: skip
 
-_SYSTEM = frozenset(("thumbs.db", "desktop.ini", "__macosx", "@eadir", "$recycle.bin", "system volume information"))
+_SYSTEM = frozenset(
+    ("thumbs.db", "desktop.ini", "__macosx", "@eadir", "$recycle.bin", "system volume information")
+)
 
 Entry = Found | tuple[str, Outcome]  # a photo, or the name of something else and why it is none
 

@@ -1,6 +1,6 @@
 """A folder under watch: a photo is drawn once it has stopped growing, and again whenever it has changed.
 
-By looking, not by notices of the system: these come in the midst of writing, and not at all from network disks.
+By looking, not by notices of the system: these come in the midst of writing, and never from network disks.
 """
 
 import time

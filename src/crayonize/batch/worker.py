@@ -47,7 +47,7 @@ class _Line:
         os._exit(0)
 
     def hear(self) -> Message:
-        """The next message; the end if there is none for long: on a cluster nobody may be left to send one."""
+        """The next message; the end if none comes for long: on a cluster nobody may be left to send one."""
         try:
             return self._messages.get(timeout=_IDLE)
         except queue.Empty:
@@ -90,7 +90,12 @@ def main() -> None:
 
 
 def _message(outcome: Outcome) -> Message:
-    return {"status": outcome.status, "error": outcome.error, "bytes": outcome.bytes, "strokes": outcome.strokes}
+    return {
+        "status": outcome.status,
+        "error": outcome.error,
+        "bytes": outcome.bytes,
+        "strokes": outcome.strokes,
+    }
 
 
 def _die_with(parent: int) -> None:
