@@ -20,7 +20,8 @@ QUALITY = 84
 
 def beside(pictures: list[Image.Image], height: int) -> Image.Image:
     """Pictures scaled to one height, side by side on white."""
-    scaled = [p.convert("RGB").resize((round(p.width * height / p.height), height), Image.Resampling.LANCZOS) for p in pictures]
+    sizes = [(round(p.width * height / p.height), height) for p in pictures]
+    scaled = [p.convert("RGB").resize(s, Image.Resampling.LANCZOS) for p, s in zip(pictures, sizes, strict=True)]
     gap = np.full((height, 8, 3), 255, np.uint8)
     row = [part for picture in scaled for part in (np.asarray(picture), gap)][:-1]
     return Image.fromarray(np.hstack(row))

@@ -74,7 +74,8 @@ def _lines(scene: Scene, width: float) -> list[Line]:
     )
     detector = cv2.ximgproc.createEdgeDrawing()
     settings = cv2.ximgproc_EdgeDrawing_Params()  # type: ignore[attr-defined]
-    settings.GradientThresholdValue, settings.AnchorThresholdValue = 14, 4
+    settings.GradientThresholdValue = 14
+    settings.AnchorThresholdValue = 0  # a clean step's gradient is as high on two pixels, none of which would stand out
     settings.MinPathLength = max(8, int(3 * width * SCALE))
     detector.setParams(settings)
     detector.detectEdges(grey)

@@ -20,7 +20,7 @@ class Pass:
     """One coat of hatching over the whole sheet, after a look at what is there."""
 
     name: str = "coat"
-    kind: str = "free"  # base or shade: by the recipe; free: whatever helps most after a look at the sheet
+    kind: Annotated[str, "base", "shade", "free"] = "free"  # by the recipe, or free: what helps most after a look
     tip: Annotated[float, 0.2, 4] = 1.0  # width of the tip, in usual tips
     sharp: bool = False  # a sharpened tip
     spacing: Annotated[float, 0.3, 2] = 0.62  # tips between lines; below 0.5 the hatch closes
@@ -90,6 +90,7 @@ def load_style(source: str) -> Style:
 
 def style_from(table: dict[str, Any], where: str) -> Style:
     """A style from its table; `where` begins the error line."""
+    table = dict(table)
     passes = table.pop("pass", [])
     if not isinstance(passes, list) or not all(isinstance(row, dict) for row in passes):
         raise ValueError(f"{where}: pass: write each coat as a [[pass]] table")
@@ -111,9 +112,13 @@ def _checked(table: dict[str, Any], kind: type, where: str) -> dict[str, Any]:
         right = isinstance(value, type(default)) or (isinstance(default, float) and type(value) is int)
         if not right or (isinstance(value, bool) and not isinstance(default, bool)):
             raise ValueError(f"{where}: {key} = {value!r} is not a {type(default).__name__}")
-        low, high = ranges.get(key, (None, None))
-        if low is not None and not low <= value <= high:
-            raise ValueError(f"{where}: {key} = {value!r} is not between {low:g} and {high:g}")
+        if isinstance(value, str):
+            if not value or not value.isprintable():
+                raise ValueError(f"{where}: {key} = {value!r} is not a line of text")
+            if key in ranges and value not in ranges[key]:
+                raise ValueError(f"{where}: {key} = {value!r} is not one of {', '.join(ranges[key])}")
+        elif key in ranges and not ranges[key][0] <= value <= ranges[key][1]:
+            raise ValueError(f"{where}: {key} = {value!r} is not between {ranges[key][0]:g} and {ranges[key][1]:g}")
     return table
 
 

@@ -62,6 +62,18 @@ def test_outline_lies_on_the_edge(closed):
         assert np.abs(off).max() < 2.0 and np.abs(off).mean() < 1.0, "mm"
 
 
+@pytest.mark.parametrize("place", [160, 201, 240])
+@pytest.mark.parametrize("pixels", [320, 400, 640])
+def test_clean_straight_edges_are_found(pixels, place):
+    """A drawn border, exactly level and exactly between two pixels."""
+    photo = np.full((pixels * 3 // 4, pixels, 3), 0.7, np.float32)
+    photo[:, place:] = 0.1
+    assert sum(map(length, outlines(photo, steady()))) > 0.9 * HEIGHT
+    across = np.full((pixels * 3 // 4, pixels, 3), 0.7, np.float32)
+    across[place // 2 :] = 0.1
+    assert sum(map(length, outlines(across, steady()))) > 0.9 * WIDTH
+
+
 def test_edges_are_drawn_all_round():
     lines = outlines(disc(), steady())
     assert sum(map(round_the_disc, lines)) > 0.85 * 360

@@ -323,6 +323,8 @@ def workshop() -> ModuleType:
 
 def warm_up() -> None:
     """Draw a narrow strip in every style, and so through every kernel, that all are compiled and kept."""
+    import tempfile
+
     import numpy as np
 
     from stroke_gen.params import style_names
@@ -331,4 +333,6 @@ def warm_up() -> None:
     strip = np.stack([x / 8, y, 0.5 + 0.5 * np.sin(2 * x * y)], axis=-1)
     for style in style_names():
         convert(strip, style=style, size=400, sheet_mm=100.0)
-    convert(strip, size=400, sheet_mm=100.0, preview=True, light=False)
+    with tempfile.TemporaryDirectory() as folder:
+        film = Path(folder) / "film.png"
+        convert(strip, size=400, sheet_mm=100.0, preview=True, light=False, timelapse=film, seconds=3)

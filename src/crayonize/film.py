@@ -1,19 +1,16 @@
 """Moving pictures: a stream of frames becomes an animated WebP, GIF or PNG, or an MP4.
 
-The writers pull frames from an iterator, so that only a few are in memory at a time, and run beside the work
-that makes the frames. Every frame but the first and the last stands for 1/FPS second.
+The writers pull frames from an iterator, so that only a few are in memory at a time; frames are left alone once
+they have been handed over. Every frame but the first and the last stands for 1/FPS second.
 """
 
 import importlib.util
 import os
-import queue
 import shutil
 import struct
 import subprocess
 import zlib
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -26,7 +23,6 @@ from PIL import Image, ImagePalette
 from .whole_file import check_target, whole_file
 
 FPS = 10  # a whole number of hundredths of a second, as GIF needs
-AHEAD = 8  # frames that may wait for the writer
 WEBP_QUALITY = 78
 CRF = 20  # quality of MP4: 0 lossless, 51 worst
 
@@ -62,52 +58,14 @@ def check(path: str | os.PathLike[str]) -> None:
     check_target(path)
 
 
-class Writer:
-    """A film being written in the background. Exactly `reel.frames` frames go in, then `close`."""
-
-    def __init__(self, path: str | os.PathLike[str], reel: Reel) -> None:
-        self.reel, self.added = reel, 0
-        self._waiting: queue.Queue[Frame | None] = queue.Queue(AHEAD)
-        self._pool = ThreadPoolExecutor(1)
-        self._written: Future[None] = self._pool.submit(self._write, path)
-
-    def add(self, frame: Frame) -> None:
-        """The next frame; it is not copied, so leave it alone after."""
-        self._put(frame)
-        self.added += 1
-
-    def close(self) -> None:
-        """Wait for the whole file. Raises what went wrong while writing."""
-        self._pool.shutdown()
-        self._written.result()
-
-    def abort(self) -> None:
-        """Leave no file behind."""
-        with suppress(Exception):
-            self._put(None)
-        self._pool.shutdown()
-
-    def _put(self, frame: Frame | None) -> None:
-        while True:
-            if self._written.done():
-                self._written.result()  # raises, for it cannot be done before its last frame
-            with suppress(queue.Full):
-                return self._waiting.put(frame, timeout=0.5)
-
-    def _write(self, path: str | os.PathLike[str]) -> None:
-        with whole_file(path) as part:
-            WRITERS[part.suffix.lower()](part, self.reel, self._frames())
-
-    def _frames(self) -> Iterator[Frame]:
-        for _ in range(self.reel.frames):
-            frame = self._waiting.get()
-            if frame is None:
-                raise _Aborted
-            yield frame
+class Aborted(Exception):
+    """To be raised by the frames of a film that is not wanted any more."""
 
 
-class _Aborted(Exception):
-    """The film is not wanted any more."""
+def write(path: str | os.PathLike[str], reel: Reel, frames: Iterator[Frame]) -> None:
+    """Write a film of `reel.frames` frames, whole or not at all."""
+    with whole_file(path) as part:
+        WRITERS[part.suffix.lower()](part, reel, frames)
 
 
 # ---- WebP and GIF by Pillow --------------------------------------------------------------------------------

@@ -69,6 +69,8 @@ def scan_picture(picture: Image.Image, file: IO[bytes] | None = None) -> Scan:
     check_size(picture.width, picture.height)
     with damage_named():
         picture.load()
+        if picture.mode == "P" and picture.palette is None:
+            raise ValueError("its table of colours is missing")
     light, transform = _color_management(picture)
     if picture.mode.startswith(("I", "F")):
         scan = _scan_deep_grey(picture)

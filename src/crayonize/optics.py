@@ -5,7 +5,6 @@ layer, which follow from the sums k*h and s*h (Kubelka 1948). Splitting a layer 
 A quiet light from the upper left shades the relief of paper and wax.
 """
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -62,31 +61,37 @@ def _render(top, bottom, left, right, ground, light, paper, total, count, crayon
                     out[y, x, c] = min(np.float32(1), out[y, x, c] * shade)
 
 
+@kernel
+def _render_parts(parts, ground, light, paper, total, count, crayon, layer, blend, optics, out):  # type: ignore[no-untyped-def]
+    """Render parts (n, 4), each top, bottom, left, right."""
+    for i in range(parts.shape[0]):
+        _render(parts[i, 0], parts[i, 1], parts[i, 2], parts[i, 3], ground, light, paper, total, count, crayon, layer,
+                blend, optics, out)  # fmt: skip
+
+
 def render(
     sheet: Sheet, ground: tuple[float, float, float], *, light: bool = True, threads: int = 1
 ) -> NDArray[np.float32]:
     """The picture of a sheet: linear RGB (rows, cols, 3) over paper of the linear colour `ground`."""
     out = np.empty((sheet.rows, sheet.cols, 3), np.float32)
-    bands = [(top, min(top + BAND, sheet.rows), 0, sheet.cols) for top in range(0, sheet.rows, BAND)]
-    render_parts(sheet, ground, bands, out, light=light, threads=threads)
+
+    def band(top: int) -> None:
+        part = np.array([[top, min(top + BAND, sheet.rows), 0, sheet.cols]])
+        render_parts(sheet, ground, part, out, light=light)
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(band, range(0, sheet.rows, BAND)))
     return out
 
 
 def render_parts(
     sheet: Sheet,
     ground: tuple[float, float, float],
-    parts: Sequence[tuple[int, int, int, int]],
+    parts: NDArray[np.int64],
     out: NDArray[np.float32],
     *,
     light: bool = True,
-    threads: int = 1,
 ) -> None:
-    """Renew parts (top, bottom, left, right; in cells) of a picture `out` that `render` gave earlier."""
+    """Renew parts (n, 4), each top, bottom, left, right in cells, of a picture `out` that `render` gave earlier."""
     strength = np.float32(LIGHT * 0.1 / sheet.cell_mm * 0.5 if light else 0)
-    base = np.array(ground, np.float32)
-
-    def part(window: tuple[int, int, int, int]) -> None:
-        _render(*window, base, strength, *sheet.columns(), out)
-
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(part, parts))
+    _render_parts(parts, np.array(ground, np.float32), strength, *sheet.columns(), out)

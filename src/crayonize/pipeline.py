@@ -1,8 +1,9 @@
 """The two conductors: a photo becomes a Drawing, a Drawing becomes a picture."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +19,21 @@ from .settings import Settings
 from .wax import Sheet
 
 Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
-Watch = Callable[["Easel", Sequence[Stroke], float], Iterable[Sequence[Stroke]]]
+
+
+class Watch(Protocol):
+    """Someone who looks on while a drawing is made."""
+
+    def open(self, easel: "Easel") -> None:
+        """A bare sheet is on the easel."""
+
+    def strokes(self, strokes: Sequence[Stroke], share: float) -> rub.Watch:
+        """Strokes are about to be drawn; `share` of the whole work they are (0..1)."""
 
 
 @dataclass
 class Easel:
-    """An open sheet with its paper and crayons: strokes go on, pictures come off.
-
-    watch: someone who looks on. Given strokes and their share of all that will be drawn (0..1), it hands them
-    back in slices, in order, and may look at the sheet after each.
-    """
+    """An open sheet with its paper and crayons: strokes go on, pictures come off."""
 
     sheet: Sheet
     box: rub.Box
@@ -37,16 +43,15 @@ class Easel:
     watch: Watch | None = None
 
     def draw(self, strokes: Sequence[Stroke], progress: rub.Progress | None = None, share: float = 1.0) -> None:
-        """Draw strokes, in order, onto what is there; slices give the same sheet, bit for bit."""
-        drawn = 0
+        """Draw strokes, in order, onto what is there; `share` of the whole drawing they are."""
+        watch = self.watch.strokes(strokes, share) if self.watch else None
+        rub.rub(self.sheet, strokes, self.box, threads=self.threads, smears=self.smears, progress=progress, watch=watch)
 
-        def report(done: int, _: int) -> None:
-            if progress:
-                progress(drawn + done, len(strokes))
-
-        for part in self.watch(self, strokes, share) if self.watch else [strokes]:
-            rub.rub(self.sheet, part, self.box, threads=self.threads, smears=self.smears, progress=report)
-            drawn += len(part)
+    def show_to(self, watch: Watch | None) -> None:
+        """Let someone look on from now."""
+        self.watch = watch
+        if watch:
+            watch.open(self)
 
     def picture(self, light: bool = True) -> NDArray[np.float32]:
         """The sheet as linear RGB (rows, cols, 3)."""
@@ -86,7 +91,7 @@ def draw(
     preview: without smearing and at half the size (section 5 of the paper).
     """
     stand = easel(drawing, max(1, size // 2) if preview else size, threads, smears=not preview)
-    stand.watch = watch
+    stand.show_to(watch)
     stand.draw(drawing.strokes, progress and (lambda done, all_: progress("drawing", done / all_)))
     return stand
 
@@ -110,8 +115,7 @@ def sketch(
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
     stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
                   smears=not settings.preview)  # fmt: skip
-    stand.watch = watch
-    stand.draw([], share=0)  # whoever looks on sees the bare sheet
+    stand.show_to(watch)
     table = calibration.swatches(stand.box.palette, paper.load_paper(settings.paper), settings.physics, stand.threads)
     stages = len(style.passes) + 1 + style.lines_first
     done = 0

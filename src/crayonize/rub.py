@@ -27,6 +27,8 @@ FACES = 3  # different sets of bumps
 HEADINGS = 9  # directions in which the bumps are drawn out, over half a turn
 
 Progress = Callable[[int, int], None]
+Drawn = Callable[[NDArray[np.int64]], None]
+Watch = Callable[[NDArray[np.float32], NDArray[np.int64], NDArray[np.float32]], Drawn]
 
 
 @functools.cache
@@ -90,18 +92,26 @@ def rub(
     threads: int = 1,
     smears: bool = True,
     progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> float:
-    """Draw strokes on a sheet in order; returns the wax the crayons gave, in um times cells."""
+    """Draw strokes on a sheet in order; returns the wax the crayons gave, in um times cells.
+
+    watch: is given the points (n, 3) in cells, where each stroke begins among them, and how far each reaches; what
+    it returns is called, in any thread, with the numbers of strokes just drawn: then the tiles (of schedule.TILE
+    cells) within their reach hold these strokes and all before them, and no later one.
+    """
     if not strokes:
         return 0.0
     points, first = _points(strokes, sheet.cell_mm)
     forces, cells = _work(points, first)
     wax_of = np.array([box.palette.index(s.crayon) for s in strokes], np.int64)
-    drawn = zip(strokes, forces * sheet.cell_mm, _headings(points, first), strict=True)
-    mask_of = np.array([box.take(stroke, newton_mm, heading) for stroke, newton_mm, heading in drawn], np.int64)
+    work = zip(strokes, forces * sheet.cell_mm, _headings(points, first), strict=True)
+    mask_of = np.array([box.take(stroke, newton_mm, heading) for stroke, newton_mm, heading in work], np.int64)
     masks, sides = box.stacked()
     side_of = sides[mask_of]
-    order = schedule.order(points, first, (side_of / 2 + 2).astype(np.float32), sheet.rows, sheet.cols)
+    reach = (side_of / 2 + 2).astype(np.float32)
+    order = schedule.order(points, first, reach, sheet.rows, sheet.cols)
+    drawn = watch(points, first, reach) if watch else None
     cost = (cells / np.maximum(1, STEP * (side_of - 2)) + 1) * side_of**2
     loss = np.zeros(len(strokes), np.float64)
     constants = box.constants.constants(sheet.cell_mm)
@@ -110,6 +120,8 @@ def rub(
     def draw(picked: NDArray[np.int64]) -> None:
         _rub(picked, points, first, wax_of, mask_of, masks, sides, np.float32(STEP), smears, constants, per_lambda,
              sheet.rows, sheet.cols, *sheet.columns(), loss)  # fmt: skip
+        if drawn:
+            drawn(picked)
 
     def report(done: int) -> None:
         if progress:

@@ -52,7 +52,9 @@ class Forge:
         )
         tracer = re.compile(rf"TracerPid:\t{strace.pid}\b")
         while not tracer.search(Path(f"/proc/{child}/status").read_text()):
-            assert strace.poll() is None, strace.stderr and strace.stderr.read()
+            if strace.poll() is not None:  # the child was killed at once
+                assert not strace.returncode, strace.stderr and strace.stderr.read()
+                break
         self._say("go")
         code = int(self._process.stdout.readline())
         strace.communicate(timeout=10)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import signal
 import time
 
@@ -11,17 +12,16 @@ from conftest import Batch, Desk, photo, tree
 def drawn(run: Batch, name: str) -> str:
     """Wait for the next line about a file; its status."""
     assert run.process.stdout
-    while True:
-        line = json.loads(run.process.stdout.readline())
-        run.lines.append(line)
-        assert "end" not in line, line
-        if line["in"] == name:
-            return str(line["status"])
+    while not (mine := [line for line in run.lines if line["in"] == name]):
+        assert select.select([run.process.stdout], [], [], 30)[0], f"nothing more is said of {name}"
+        run.lines.append(json.loads(run.process.stdout.readline()))
+    run.lines.remove(mine[0])
+    return str(mine[0]["status"])
 
 
 def test_photos_are_drawn_when_they_have_stopped_growing(desk: Desk) -> None:
     desk.fill(2).run()
-    run = desk.start("--watch")
+    run = desk.start("--watch", bufsize=0)
     assert drawn(run, "1/p0001.png") == "skipped"
     content = photo(desk.base / "late.png", 5).read_bytes()
     with open(desk.photos / "late.png", "wb") as file:
@@ -30,7 +30,7 @@ def test_photos_are_drawn_when_they_have_stopped_growing(desk: Desk) -> None:
             file.flush()
             time.sleep(0.5)
     (desk.photos / "broken.png").write_bytes(content[:200])
-    assert {drawn(run, "late.png"), drawn(run, "broken.png")} == {"ok", "failed"}
+    assert (drawn(run, "late.png"), drawn(run, "broken.png")) == ("ok", "failed")
     photo(desk.photos / "broken.png", 6)
     assert drawn(run, "broken.png") == "ok", "mended, it is tried again"
     photo(desk.photos / "late.jpg", 5)

@@ -59,7 +59,8 @@ class Cluster:
             distributed: Any = import_module("distributed")
         except ImportError as error:
             raise ImportError('--dask needs more: pip install "crayonize[cluster]"') from error
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told by us
+        for name in ("distributed.client", "distributed.comm"):  # what matters is told by us
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         self._client = distributed.Client(address, timeout=_CONNECTING, set_as_default=False)
         self._hello: Message = {"recipe": _absolute_files(recipe).to_json(), "render": render}
         self._time_limit = time_limit
