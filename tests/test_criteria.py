@@ -1,7 +1,7 @@
 """The figures of criteria.py themselves: on patterns whose answer is known, and once on a drawing."""
 
-import cv2
 import criteria
+import cv2
 import numpy as np
 import pytest
 
@@ -47,7 +47,8 @@ def test_alignment_of_noise():
 
 @pytest.mark.parametrize("degrees, expected", [(0, 1), (45, 0), (90, -1), (30, 0.5)])
 def test_strokes_against_a_field(degrees, expected):
-    laid = criteria.Hatching(np.ones(SHAPE), even(degrees), np.zeros(6, np.int32), [line((10, 20), (20, 20), (50, 20))] * 2)
+    strokes = [line((10, 20), (20, 20), (50, 20))] * 2
+    laid = criteria.Hatching(np.ones(SHAPE), even(degrees), np.zeros(6, np.int32), strokes)
     assert criteria.followed([(laid, laid.tangent)], 1.0) == pytest.approx(expected, abs=1e-3)
     assert criteria.followed([], 1.0) is None
 

@@ -114,12 +114,25 @@ def test_opposing_hues_clash():
     assert clash(red, green) == pytest.approx(clash(green, red))
 
 
-def test_brown_is_not_red_over_green():
-    result = found(patches((0.13, 0.07, 0.03)))
-    assert set(mix(result, (0.13, 0.07, 0.03))) != {"red", "green"}
+def test_brown_is_not_red_under_green_even_where_that_fits():
+    red, green, black = (NAMES.index(name) for name in ("red", "green", "black"))
+    brown = TABLE.over(TABLE.over(TABLE.paper)[red, 3])[green, 1]
+    few = TABLE.only([red, green, black])
+    result = found(patches(brown), table=few)
+    assert {few.names[result.base[0]], few.names[result.shade[0]]} != {"red", "green"}
 
 
-def test_rival_is_of_like_hue():
+def test_rival_is_nearly_as_good_and_of_like_hue_under_the_same_shade():
+    hues = np.array([[0.1, 0.1], [0.12, 0.1], [-0.2, 0.1], [0, 0], [0.1, 0.12]], np.float32)
+    pairs = np.array([[0, 3], [1, 3], [2, 3], [4, 2], [3, 3]])
+    cost = np.array([[0.1, 0.112, 0.101, 0.1, 0.1]], np.float32)
+    base, shade = np.array([0]), np.array([3])
+    assert recipes._rivals(cost, pairs, base, shade, hues).tolist() == [1]
+    cost[0, 1] = 0.1 + 2 * recipes.RIVAL
+    assert recipes._rivals(cost, pairs, base, shade, hues).tolist() == [0]
+
+
+def test_rivals_of_a_picture_are_of_like_hue():
     noise = np.random.default_rng(3).random((60, 80, 3)).astype(np.float32)
     result = found(oklab(noise), groups=20)
     hues = oklab(TABLE.over(TABLE.paper))[:, -3, 1:]

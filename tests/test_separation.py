@@ -65,7 +65,10 @@ def slow_gains(current, lab, table, need, coat):
     return gain, best
 
 
-@pytest.mark.parametrize("coat", [Pass(), Pass(tone=0.3, dark_price=1.0), Pass(hardest=0.4), Pass(hardest=0.03)], ids=repr)
+COATS = [Pass(), Pass(tone=0.3, dark_price=1.0), Pass(hardest=0.4), Pass(hardest=0.03)]
+
+
+@pytest.mark.parametrize("coat", COATS, ids=["plain", "first", "light", "lightest"])
 def test_gains_are_those_of_the_slow_twin(coat):
     rng = np.random.default_rng(1)
     current, target = rng.random((2, 45, 30, 3)).astype(np.float32)

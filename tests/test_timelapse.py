@@ -27,14 +27,16 @@ def scribble():
     """Thirty strokes of all crayons that cross each other, some over the edge."""
     rng = np.random.default_rng(1)
     names = ("red", "yellow", "blue", "green", "black")
-    strokes = [stroke(rng.uniform(-5, 105, 2) + np.cumsum(rng.normal(0, 12, (4, 2)), 0), names[i % 5]) for i in range(30)]
-    return Drawing(100.0, 60.0, "drawing", "box8", tuple(strokes))
+    paths = [rng.uniform(-5, 105, 2) + np.cumsum(rng.normal(0, 12, (4, 2)), 0) for _ in range(30)]
+    strokes = tuple(stroke(path, names[i % 5]) for i, path in enumerate(paths))
+    return Drawing(100.0, 60.0, "drawing", "box8", strokes)
 
 
 @pytest.fixture(scope="module")
 def line():
     """One long slow line from left to right."""
-    return Drawing(100.0, 20.0, "smooth", "box8", (stroke(np.stack([np.linspace(5, 95, 90), np.full(90, 10)], 1), note="line"),))
+    path = np.stack([np.linspace(5, 95, 90), np.full(90, 10)], 1)
+    return Drawing(100.0, 20.0, "smooth", "box8", (stroke(path, note="line"),))
 
 
 def frames_of(drawing, tmp_path, size=SIZE, seconds=3, **options):
@@ -114,11 +116,11 @@ def test_long_stroke_grows_from_frame_to_frame(line, tmp_path):
 
 
 def test_tip_is_seen_where_the_stroke_has_come_and_not_at_the_end(line, tmp_path):
-    easel, plain = frames_of(line, tmp_path)
+    _, plain = frames_of(line, tmp_path)
     _, shown = frames_of(line, tmp_path, show_tip=True)
     middle = len(plain) // 2
     y, x = np.nonzero(np.abs(plain[middle] - shown[middle]).max(2))
-    assert 10 < y.size and abs(x.min() - SIZE / 2) < SIZE / 8 and y.min() >= 11
+    assert y.size > 10 and abs(x.min() - SIZE / 2) < SIZE / 8 and y.min() >= 11
     assert np.array_equal(plain[-1], shown[-1])
 
 
@@ -234,7 +236,7 @@ def test_broken_off_work_leaves_no_film(scribble, tmp_path):
 def test_colours_of_a_gif_are_near_all_that_can_appear(scribble):
     easel = pipeline.draw(scribble, SIZE)
     palette = timelapse._colours(easel).astype(int)
-    assert palette.shape == (255, 3)
+    assert 100 < len(palette) <= 255
     pixels = reduced(easel).reshape(-1, 3)[::7]
     nearest = np.abs(pixels[:, None] - palette).max(2).min(1)
     assert np.mean(nearest) < 20

@@ -155,11 +155,12 @@ def run(
     try:
         with crew.change:
             while crew.left and not crew.failure:
-                crew.change.wait(0.1)
                 progress(len(crew.waits) - crew.left)
+                crew.change.wait(0.1)
     except BaseException as error:
         crew.failure = error
     for hand in hands:
         hand.join()
     if crew.failure:
         raise crew.failure
+    progress(len(crew.waits))

@@ -34,7 +34,7 @@ LINES = ("line", "outline")  # notes of strokes that belong to the outline
 PLACE_MM = 1.5  # cells of the map of which crayon lies where
 SMALLEST_MM2 = 200.0  # a patch of colour smaller than this gets no outline
 PENCIL_TIP, PENCIL_N = Tip("sharp", 1.1), 0.55
-SOLID_UM = 3.0  # film at which the wax hides about two thirds of the pale drawing below
+SOLID_UM = 3.0  # film at which the wax hides about two thirds of the pale drawing below it on a page
 
 _NEAR = np.ones((3, 3), np.uint8)  # a cell and its neighbours
 
@@ -217,22 +217,17 @@ def _pages(drawing: Drawing, progress: Progress | None) -> Iterator[Picture]:
     layout = _Layout(drawing)
     done = pipeline.draw(drawing, layout.size)
     yield layout.first(drawing, encode_srgb(done.picture()), legend.used_crayons(done.box.palette, done.box.given_mm3))
-    before = pipeline.easel(drawing, layout.size)
+    paper = np.array(done.ground, np.float32)
+    under = np.broadcast_to(paper, done.picture().shape)
     for number, step in enumerate(steps, 1):
         if progress:
             progress("steps", number / len(steps))
         fresh = pipeline.easel(drawing, layout.size)
         fresh.draw(step.strokes)
-        yield layout.page(drawing, step, number, len(steps), _shown(before, fresh))
-        before.draw(step.strokes)
-
-
-def _shown(before: pipeline.Easel, fresh: pipeline.Easel) -> Picture:
-    """New wax in full colour over a pale picture of what was drawn before; sRGB."""
-    under, paper = before.picture(), np.array(before.ground, np.float32)
-    pale = paper + PALE * (under - paper)
-    cover = 1 - np.exp(-fresh.sheet.film_um() / SOLID_UM)[..., None]
-    return encode_srgb(pale * (1 - cover) + fresh.picture() * cover)
+        wax, cover = fresh.picture(), 1 - np.exp(-fresh.sheet.film_um() / SOLID_UM)[..., None]
+        pale = paper + PALE * (under - paper)
+        yield layout.page(drawing, step, number, len(steps), encode_srgb(pale + cover * (wax - pale)))
+        under = under + cover * (wax - under)
 
 
 class _Layout:
@@ -279,7 +274,7 @@ class _Layout:
         lettering.write(MARGIN_MM + 20, MARGIN_MM + 4.5, words, 1.1, room - patches)
         lettering.write(self.page_mm[0] / 2, self.page_mm[1] - FOOT_MM, f"{number} of {steps}", 0.9, anchor="mm")
         page = lettering.picture()
-        for place, crayon in enumerate(step.crayons[:8]):
+        for place, crayon in enumerate(step.crayons[7::-1]):
             left = self._px(self.page_mm[0] - MARGIN_MM - 25 * (place + 1))
             self._paste(page, self._swatch(drawing, crayon), left, self._px(MARGIN_MM - 5))
         self._paste(page, picture, (page.shape[1] - picture.shape[1]) // 2, self._px(HEAD_MM))

@@ -25,6 +25,7 @@ from .svg_shapes import RGB, Page, Shape
 from .svg_xml import read_svg
 
 LINE_TIP_MM = (0.6, 8.0)  # sharpened to the whole crayon
+OWN_TIP_MM = (0.1, 100.0)  # of files that carry forces, as ours do
 FILL_TIP_MM = (0.9, 2.8)
 SHARP_MM = 1.2  # a finer tip is a sharpened one
 PRESSURE = 0.4  # N/mm^2 under the tip
@@ -141,15 +142,15 @@ def _named(shape: Shape, colour: RGB, chooser: _Chooser) -> str:
 
 def _drawn(shape: Shape, crayon: str, visible: "_Visible", widths: str, usual_mm: float) -> Iterator[Stroke]:
     """The lines of a shape."""
+    own = _own_forces(shape)
     if widths == "force":
         tip = Tip("blunt", 2.4)
         force = LINE_FORCE_N * float(np.clip(shape.width_mm / max(usual_mm, 1e-9), 0.2, 4.0))
     else:
-        width = float(np.clip(shape.width_mm, *LINE_TIP_MM))
+        width = float(np.clip(shape.width_mm, *(OWN_TIP_MM if own is not None else LINE_TIP_MM)))
         tip = Tip(_kind(shape, width), width, _angle(shape))
         force = _force(tip)
     force *= 0.3 + 0.7 * shape.stroke_opacity
-    own = _own_forces(shape)
     for line in shape.lines:
         line = _dot(line, tip.width_mm) if own is None else line
         if own is not None and len(own) == len(line):

@@ -103,7 +103,7 @@ def test_pages(
 def test_heic_without_its_package_names_what_to_install(desk: Desk) -> None:
     desk.fill(1)
     (desk.photos / "phone.heic").write_bytes(b"\0\0\0\x18ftypheic\0\0\0\0heicmif1" + bytes(100))
-    path = os.pathsep.join(map(str, (HERE / "no_heif", HERE.parents[1] / "src", HERE.parents[1], HERE)))
+    path = os.pathsep.join(map(str, (HERE / "missing", HERE.parents[1] / "src", HERE.parents[1], HERE)))
     run = desk.start(env={**os.environ, "PYTHONPATH": path})
     assert run.end() == 3
     assert run.status("phone.heic") == "failed" and run.count("ok") == 1

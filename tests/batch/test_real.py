@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT, check_whole, tree
+from conftest import HERE, ROOT, check_whole, tree
 from PIL import Image
 
 SMALL = ["--print", "a6", "--dpi", "12", "--style", "sketch"]
 
 
-def crayonize(*words: object, **how: Any) -> subprocess.Popen[str]:
-    """Start the command."""
-    env = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}"}
+def crayonize(*words: object, missing: bool = False, **how: Any) -> subprocess.Popen[str]:
+    """Start the command; `missing`: as if no extra package were there."""
+    path = os.pathsep.join(map(str, (*([HERE / "missing"] if missing else []), ROOT / "src", ROOT)))
+    env = {**os.environ, "PYTHONPATH": path}
     return subprocess.Popen([sys.executable, "-m", "crayonize", *map(str, words)], env=env, text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, **how)  # fmt: skip
 
@@ -79,3 +80,14 @@ def test_settings_that_are_none_are_refused_before_any_photo(photos: Path, tmp_p
     run = crayonize(photos, tmp_path / "out", "--paper", "no-such-paper")
     _, err = run.communicate(timeout=60)
     assert run.returncode == 2 and "no-such-paper" in err
+
+
+@pytest.mark.parametrize("extra", ["cluster", "remote"])
+def test_a_missing_extra_names_what_to_install(photos: Path, tmp_path: Path, extra: str) -> None:
+    words = [photos, tmp_path / "out", "--dask", "tcp://127.0.0.1:9"]
+    if extra == "remote":
+        words = ["s3://bucket/photos", tmp_path / "out"]
+    run = crayonize(*words, missing=True)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 3 and f'pip install "crayonize[{extra}]"' in err
+    assert err.count("\n") == 1

@@ -25,10 +25,10 @@ def test_photos_are_drawn_when_they_have_stopped_growing(desk: Desk) -> None:
     assert drawn(run, "1/p0001.png") == "skipped"
     content = photo(desk.base / "late.png", 5).read_bytes()
     with open(desk.photos / "late.png", "wb") as file:
-        for i in range(6):  # 3 s of growing, longer than a photo must have been at rest
+        for i in range(6):  # 2.5 s of growing, longer than a photo must have been at rest
             file.write(content[i * len(content) // 6 : (i + 1) * len(content) // 6])
             file.flush()
-            time.sleep(0.5)
+            time.sleep(0.42)
     (desk.photos / "broken.png").write_bytes(content[:200])
     assert (drawn(run, "late.png"), drawn(run, "broken.png")) == ("ok", "failed")
     photo(desk.photos / "broken.png", 6)

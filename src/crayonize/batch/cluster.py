@@ -11,6 +11,7 @@ import queue
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
@@ -25,7 +26,6 @@ from .remote import is_remote
 _CONNECTING = 10.0  # s
 _AHEAD = 2  # jobs sent for each thread of the cluster
 _LOST = 60.0  # s without a cluster after which it is given up
-_LOST_TEXT = "the cluster is lost; run the same again when it is back"
 
 _crews: dict[tuple[str, int], Crew] = {}  # on the cluster: recipe and thread -> crew
 
@@ -59,13 +59,18 @@ class Cluster:
             distributed: Any = import_module("distributed")
         except ImportError as error:
             raise ImportError('--dask needs more: pip install "crayonize[cluster]"') from error
-        for name in ("distributed.client", "distributed.comm"):  # what matters is told by us
+        for name in (
+            "distributed.client",
+            "distributed.comm",
+            "distributed.batched",
+        ):  # what matters is told by us
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self._client = distributed.Client(address, timeout=_CONNECTING, set_as_default=False)
         self._hello: Message = {"recipe": _absolute_files(recipe).to_json(), "render": render}
         self._time_limit = time_limit
         self._inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()  # futures that are done, or None to look up
         self._stop_at: float | None = None
+        self._whole = True  # nothing was lost or broken off
 
     def work(self, jobs: Iterator[Job | None]) -> Iterator[tuple[Job, Outcome]]:
         """Do the jobs and give what became of each; as Crew.work."""
@@ -83,14 +88,18 @@ class Cluster:
             except queue.Empty:
                 lost_since = None if self._client.status == "running" else lost_since or time.monotonic()
                 if self._client.status == "closed" or (lost_since and time.monotonic() - lost_since > _LOST):
-                    raise CrewError(_LOST_TEXT) from None
+                    raise self._lost() from None
                 continue
             if future in pending:
                 yield pending.pop(future), self._outcome(future)
 
     def _send(self, jobs: Iterator[Job | None], pending: dict[Any, Job]) -> bool:
         """Send some jobs ahead; False when there are no more."""
-        while len(pending) < _AHEAD * max(1, sum(self._client.nthreads().values())):
+        try:
+            threads = sum(self._client.nthreads().values())
+        except OSError as error:
+            raise self._lost() from error
+        while len(pending) < _AHEAD * max(1, threads):
             try:
                 job = next(jobs)
             except StopIteration:
@@ -111,19 +120,25 @@ class Cluster:
         except import_module("distributed").KilledWorker:
             return Outcome("died", "several machines or workers of the cluster died of it")
         except Exception as error:  # whatever a cluster of another version may raise
-            lost = self._client.status != "running"
-            raise CrewError(_LOST_TEXT if lost else f"the cluster cannot draw: {error}") from error
+            lost = isinstance(error, OSError) or self._client.status != "running"
+            raise self._lost() if lost else CrewError(f"the cluster cannot draw: {error}") from error
+
+    def _lost(self) -> CrewError:
+        self._whole = False
+        return CrewError("the cluster is lost; run the same again when it is back")
 
     def stop(self, now: bool = False) -> None:
         """End soon, or now. Pictures in work on the cluster are finished there."""
+        self._whole = False
         self._stop_at = time.monotonic() + (0 if now else GRACE)
         self._inbox.put(None)
 
     def close(self) -> None:
         """Let the cluster go."""
-        if self._client.status == "running" and self._stop_at is None:
-            self._client.run(send_home)
-        self._client.close(timeout=5)
+        with suppress(OSError):
+            if self._whole:
+                self._client.run(send_home)
+            self._client.close(timeout=5)
 
 
 def _absolute_files(recipe: Recipe) -> Recipe:

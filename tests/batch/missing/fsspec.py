@@ -1,0 +1,3 @@
+"""Stands in the way of an extra package."""
+
+raise ImportError("hidden for a test")
