@@ -320,7 +320,7 @@ def _convert_parser() -> _Parser:
     add("--print", choices=page.PAGES, help="fill a page of this size")
     add("--dpi", type=_dpi, help="pixels to the inch, in place of --size (300 with --print)")
     add("--metadata", choices=metadata.CHOICES, default="safe",
-        help="what the photo tells of itself: safe keeps title, names and date, but no place (%(default)s)")  # fmt: skip
+        help="what the photo tells of itself: safe keeps title, names, date, but no place (%(default)s)")  # fmt: skip
     _add_beside(parser)
     _add_size(parser)
     _add_talk(parser)

@@ -1,5 +1,6 @@
 """What is told of a batch, and what it costs the foreman."""
 
+import json
 import os
 import pty
 import random
@@ -73,14 +74,16 @@ def test_workers_wait_for_memory(desk: Desk) -> None:
     run = desk.run("--memory", str(int(1.3 * memory.need("PNG", 384, 64))))
     assert run.count("ok") == 6
     assert time.monotonic() - begun > 6 * 0.2
-    assert sum(line["seconds"] for line in run.lines[:-1]) > 6 * 0.2 + 5 * 0.2, "somebody waited"
+    assert sum(line["seconds"] for line in run.lines[:-1]) > 6 * 0.2 + 3 * 0.2, "somebody waited"
 
 
 def test_many_photos_cost_the_foreman_little(desk: Desk) -> None:
     content = photo(desk.base / "a.png").read_bytes()
     for i in range(600):
         (desk.photos / f"{i:03}.png").write_bytes(content if i % 12 else content[:100])
-    run = desk.start("--existing", "auto")
+    log = desk.base / "log"
+    with open(log, "wb") as stdout:
+        run = desk.start(stdout=stdout)
     most = files = 0
     while run.process.poll() is None:
         fields = Path(f"/proc/{run.process.pid}/statm").read_text().split()
@@ -89,6 +92,7 @@ def test_many_photos_cost_the_foreman_little(desk: Desk) -> None:
         files = max(files, len(os.listdir(f"/proc/{run.process.pid}/fd")))
         time.sleep(0.02)
     assert run.end() == 3
+    run.lines = [json.loads(line) for line in log.read_text().splitlines()]
     assert (run.count("ok"), run.count("failed")) == (550, 50)
     assert most < 60 << 20 and files < 32
     begun = time.monotonic()
