@@ -44,7 +44,7 @@ def generate(
     strokes: list[Stroke] = []
     now = observe([], group.shape)
     for stage in lines * style.lines_first + stages + lines:
-        fresh = stage(now)
+        fresh = hand.within(stage(now), width_mm, height_mm)
         strokes += fresh
         now = observe(fresh, group.shape)
     return strokes

@@ -4,7 +4,7 @@ All strokes of a coat are worked on at once as flat arrays. Every number is roun
 rounds it, so that a saved drawing gives the same picture.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,19 @@ def draw(
     newton = np.clip(force * 0.785 * tip.width_mm**2 * style.press, 0.02, 60)
     xy, force_n = np.round(path, 3).astype(np.float32), np.round(newton, 3).astype(np.float32)
     return [Stroke(xy[a : b + 1], force_n[a : b + 1], crayon, tip, note) for a, b in zip(first, last, strict=True)]
+
+
+def within(strokes: list[Stroke], width_mm: float, height_mm: float) -> list[Stroke]:
+    """Strokes held back where they leave a sheet by more than its own size, which a drawing's file forbids.
+
+    Only a thread of a sheet is so narrow that the hand slips that far.
+    """
+    size = np.array([width_mm, height_mm])
+    low, high = np.round(-size, 3).astype(np.float32), np.round(2 * size, 3).astype(np.float32)
+    return [
+        s if ((low <= s.path_mm) & (s.path_mm <= high)).all() else replace(s, path_mm=s.path_mm.clip(low, high))
+        for s in strokes
+    ]
 
 
 def _overshoot(

@@ -1,69 +1,10 @@
-"""Fixtures: a box of test crayons and a bench on which strokes are drawn with either physics."""
+"""Fixtures: a bench on which strokes are drawn with either physics."""
 
-from dataclasses import dataclass, replace
-
-import numpy as np
 import pytest
+from bench_sheet import CRAYONS, Bench
 
 from crayonize import rub
 from crayonize.palette import Crayon, Palette
-from crayonize.paper import Paper, tooth
-from crayonize.wax import Physics, Sheet
-from stroke_gen.drawing import Stroke, Tip
-
-CRAYONS = {  # k and s per um, unlike in all channels
-    "red": ((0.005, 0.12, 0.1), (0.03, 0.01, 0.012)),
-    "yellow": ((0.002, 0.006, 0.15), (0.03, 0.028, 0.005)),
-    "blue": ((0.15, 0.08, 0.01), (0.005, 0.01, 0.03)),
-    "white": ((0.001, 0.001, 0.0012), (0.06, 0.055, 0.05)),
-    "black": ((0.3, 0.31, 0.29), (0.004, 0.005, 0.006)),
-    "green": ((0.1, 0.01, 0.09), (0.01, 0.03, 0.011)),
-    "brown": ((0.05, 0.1, 0.2), (0.02, 0.015, 0.013)),
-}
-
-
-@dataclass
-class Bench:
-    """Where a test draws: one physics, one box of crayons."""
-
-    physics: Physics
-    palette: Palette
-
-    def sheet(self, heights: np.ndarray, cell_mm: float = 0.1) -> Sheet:
-        """A blank sheet with a given tooth in um."""
-        crayons = self.palette.crayons
-        k, s = np.array([c.k for c in crayons], np.float32), np.array([c.s for c in crayons], np.float32)
-        return Sheet(heights.astype(np.float32), cell_mm, k, s)
-
-    def felt(self, rows: int, cols: int, cell_mm: float = 0.1, seed: int = 0, wavelength_mm: float = 0.8) -> Sheet:
-        """A blank sheet of felt-pressed paper, tooth 45 um."""
-        return self.sheet(tooth(Paper("", "", "felt", wavelength_mm, 45.0), rows, cols, cell_mm, seed), cell_mm)
-
-    def stroke(self, path_mm: object, um: float, crayon: str = "red", tip: Tip | None = None) -> Stroke:
-        """A stroke whose force makes a mean overlap of `um` under a blunt tip of 1.6 mm or another tip."""
-        tip = tip or Tip("blunt", 1.6)
-        path = np.array(path_mm, np.float32).reshape(-1, 2)
-        force = um * self.physics.lam * np.pi / 4 * tip.width_mm**2
-        return Stroke(path, np.full(len(path), force, np.float32), crayon, tip)
-
-    def draw(self, sheet: Sheet, strokes: list[Stroke], **options: object) -> float:
-        """Draw with fresh crayons; returns the wax given in um times cells."""
-        return rub.rub(sheet, strokes, rub.Box(self.palette, self.physics, sheet.cell_mm), **options)
-
-    def changed(self, **constants: float) -> "Bench":
-        """The same bench with other constants of the wax."""
-        return Bench(replace(self.physics, **constants), self.palette)
-
-    def scribble(self, rng: np.random.Generator, number: int, size_mm: float, um: float = 6.0) -> list[Stroke]:
-        """Random strokes of all crayons and tips, some of them over the edge of the sheet."""
-        strokes = []
-        for _ in range(number):
-            path = rng.uniform(-0.05, 1.05, 2) * size_mm + np.cumsum(rng.normal(0, 1.2, (rng.integers(1, 6), 2)), 0)
-            kind = str(rng.choice(["sharp", "blunt", "rim", "side"]))
-            tip = Tip(kind, float(rng.uniform(0.8, 2.0)), float(rng.uniform(0, 360)))
-            crayon = str(rng.choice([c.name for c in self.palette.crayons]))
-            strokes.append(self.stroke(path, um * float(rng.uniform(0.1, 2.5)), crayon, tip))
-        return strokes
 
 
 @pytest.fixture(scope="session")

@@ -127,12 +127,14 @@ def test_more_lines_for_more_budget_and_none_for_none():
 
 
 def test_strong_edges_come_first():
-    """With little budget the strong disc is drawn, the faint one is not."""
+    """With little budget the strong disc is drawn, with more the faint one as well."""
     photo = disc((0.1, 0.1, 0.1), (0.6, 0.6, 0.6))
     y, x = np.mgrid[:300, :400] / 2
-    photo[np.hypot(x - 165, y - 120) < 20] = (0.5, 0.5, 0.5)
-    lines = outlines(photo, steady(lines=0.1))
-    assert lines and all(abs(np.linalg.norm(s.path_mm.mean(0) - CENTRE)) < RADIUS + 2 for s in lines)
+    photo[np.hypot(x - 165, y - 120) < 20] = (0.35, 0.35, 0.35)
+    little, more = (outlines(photo, steady(lines=amount)) for amount in (0.1, 1.0))
+    near = [[np.linalg.norm(s.path_mm - CENTRE, axis=1).max() < RADIUS + 2 for s in lines] for lines in (little, more)]
+    assert near[0] and all(near[0])
+    assert not all(near[1]) and sum(near[1]) >= len(near[0])
 
 
 def test_light_lines_before_dark_ones():

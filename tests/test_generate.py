@@ -71,7 +71,7 @@ PICTURES = {
 
 def sheet_mm(photo):
     scale = LONG_MM / max(photo.shape[:2])
-    return photo.shape[1] * scale, photo.shape[0] * scale
+    return max(1.0, photo.shape[1] * scale), max(1.0, photo.shape[0] * scale)
 
 
 def strokes_for(photo, style="artist", seed=0, table=TABLE, threads=2, **options):
@@ -89,7 +89,7 @@ def shown(photo, strokes, table=TABLE):
 def checked(strokes, photo):
     """The strokes as a drawing that keeps the rules of the file."""
     width, height = sheet_mm(photo)
-    drawing = Drawing(max(width, 1.0), max(height, 1.0), "drawing", "box24", tuple(strokes))
+    drawing = Drawing(width, height, "drawing", "box24", tuple(strokes))
     check_drawing(drawing, "drawing")
     for stroke in strokes:
         assert np.isfinite(stroke.path_mm).all() and np.isfinite(stroke.force_n).all()
@@ -112,6 +112,12 @@ def same(one, two):
 def test_any_picture_gives_strokes_that_can_be_drawn(name, style):
     photo = PICTURES[name]
     checked(strokes_for(photo, style), photo)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_hand_is_held_back_on_a_thread_of_a_sheet(seed):
+    photo = PICTURES["500x1"]
+    checked(strokes_for(photo, replace(load_style("child"), overshoot=2.0), seed), photo)
 
 
 @pytest.mark.parametrize("style", style_names())

@@ -113,6 +113,16 @@ def replace_points(paths, value):
     return replace(paths, points=np.full_like(paths.points, value))
 
 
+def test_on_a_thread_of_a_sheet_the_hand_is_held_back():
+    strokes = drawn(lines(50), replace(load_style("child"), wobble=1.0), Tip("blunt", 4.0))
+    held = hand.within(strokes, 297.0, 8.0)
+    points = np.concatenate([s.path_mm for s in held])
+    assert points[:, 1].min() >= -8 and points[:, 1].max() == 16
+    assert hand.within(strokes, 297.0, 210.0) == strokes
+    for one, two in zip(strokes, held, strict=True):
+        assert (one.force_n == two.force_n).all()
+
+
 @pytest.mark.parametrize("pressure", [0.0, 1e-6, 50.0])
 def test_forces_stay_within_the_limits_of_a_drawing(pressure):
     for stroke in drawn(lines(20, pressure=pressure), load_style("child"), Tip("blunt", 30.0)):

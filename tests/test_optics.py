@@ -3,7 +3,7 @@
 import naive
 import numpy as np
 import pytest
-from conftest import Bench
+from bench_sheet import Bench
 from test_wax import old_wax
 
 from crayonize import optics, rub

@@ -114,12 +114,15 @@ def test_opposing_hues_clash():
     assert clash(red, green) == pytest.approx(clash(green, red))
 
 
-def test_brown_is_not_red_under_green_even_where_that_fits():
+@pytest.mark.parametrize("price, taken", [(0.0, True), (1.0, False)])
+def test_opposing_hues_have_their_price(monkeypatch, price, taken):
+    """Red under green fits this brown exactly; whether it is taken is a matter of the price."""
+    monkeypatch.setattr(recipes, "CLASH_PRICE", price)
     red, green, black = (NAMES.index(name) for name in ("red", "green", "black"))
     brown = TABLE.over(TABLE.over(TABLE.paper)[red, 3])[green, 1]
     few = TABLE.only([red, green, black])
     result = found(patches(brown), table=few)
-    assert {few.names[result.base[0]], few.names[result.shade[0]]} != {"red", "green"}
+    assert ({few.names[result.base[0]], few.names[result.shade[0]]} == {"red", "green"}) is taken
 
 
 def test_rival_is_nearly_as_good_and_of_like_hue_under_the_same_shade():

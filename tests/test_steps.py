@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from crayonize import steps
+from crayonize import cli, steps
 from crayonize.palette import load_palette
 from crayonize.steps import outline_of, save_steps, steps_of
 from stroke_gen.drawing import Drawing, Stroke, Tip
@@ -132,3 +132,13 @@ def test_what_cannot_be_is_refused(drawing, tmp_path):
     with pytest.raises(ValueError, match="no strokes"):
         save_steps(Drawing(30.0, 50.0, "smooth", "box8", ()), tmp_path / "a.pdf")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_command_makes_pages_from_lines_of_another_program(tmp_path, capsys):
+    shape = '<rect x="10" y="10" width="60" height="30" fill="red"/><path stroke="blue" fill="none" d="M0 45H100"/>'
+    (tmp_path / "a.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 50">{shape}</svg>')
+    assert cli.main(["steps", str(tmp_path / "a.svg"), str(tmp_path / "a.pdf"), "--palette", "box8"]) == 0
+    assert (tmp_path / "a.pdf").read_bytes().count(b"/Type /Page\n") == 4
+    assert cli.main(["steps", str(tmp_path / "a.svg"), str(tmp_path / "a.txt")]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.splitlines()[-1].startswith("crayonize: ") and ".pdf" in err

@@ -155,6 +155,7 @@ def test_forces():
     assert set(FORCES) == {"light", "normal", "heavy"}
     assert with_force(style, 2).press == with_force(style, "2.0").press == 2 * style.press
     assert replace(with_force(style, 0.3), press=style.press) == style
+    assert with_force(load_style("solid"), 2).press == 2 * load_style("solid").press
 
 
 @pytest.mark.parametrize("force", ["hard", "", 0, -1, 6, "nan", float("nan"), "inf"])

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from crayonize import film, pipeline, timelapse
+from crayonize import cli, film, pipeline, timelapse
 from crayonize.image_color import encode_srgb
+from crayonize.svg_in import load_svg
 from crayonize.timelapse import Timelapse, pace
-from stroke_gen.drawing import Drawing, Stroke, Tip
+from stroke_gen.drawing import Drawing, Stroke, Tip, save_drawing
 
 SIZE = 120
 
@@ -27,7 +28,7 @@ def scribble():
     """Thirty strokes of all crayons that cross each other, some over the edge."""
     rng = np.random.default_rng(1)
     names = ("red", "yellow", "blue", "green", "black")
-    paths = [rng.uniform(-5, 105, 2) + np.cumsum(rng.normal(0, 12, (4, 2)), 0) for _ in range(30)]
+    paths = [rng.uniform((-5, -5), (105, 65)) + np.cumsum(rng.normal(0, 10, (4, 2)), 0) for _ in range(30)]
     strokes = tuple(stroke(path, names[i % 5]) for i, path in enumerate(paths))
     return Drawing(100.0, 60.0, "drawing", "box8", strokes)
 
@@ -240,3 +241,41 @@ def test_colours_of_a_gif_are_near_all_that_can_appear(scribble):
     pixels = reduced(easel).reshape(-1, 3)[::7]
     nearest = np.abs(pixels[:, None] - palette).max(2).min(1)
     assert np.mean(nearest) < 20
+
+
+# ---- the command -----------------------------------------------------------------------------------------
+
+
+def test_command_films_a_saved_drawing_and_adds_its_legend(scribble, tmp_path):
+    save_drawing(scribble, tmp_path / "d.json")
+    words = ["draw", tmp_path / "d.json", tmp_path / "a.png", "--size", SIZE, "--timelapse", tmp_path / "a.gif",
+             "--seconds", "3", "--show-tip", "--legend", "--strokes", tmp_path / "a.svg"]  # fmt: skip
+    assert cli.main([str(word) for word in words]) == 0
+    with Image.open(tmp_path / "a.png") as picture, Image.open(tmp_path / "a.gif") as moving:
+        assert picture.width == SIZE and picture.height > 72 and moving.n_frames > 9
+    assert load_svg(tmp_path / "a.svg", palette="box8").width_mm == 100
+
+
+def test_command_films_a_photo(tmp_path):
+    photo = np.full((40, 60, 3), 230, np.uint8)
+    photo[10:30, 20:40] = (200, 40, 30)
+    Image.fromarray(photo).save(tmp_path / "photo.png")
+    words = [tmp_path / "photo.png", tmp_path / "a.png", "--size", SIZE, "--timelapse", tmp_path / "a.png.webp",
+             "--seconds", "4"]  # fmt: skip
+    assert cli.main([str(word) for word in words]) == 0
+    with Image.open(tmp_path / "a.png.webp") as moving, Image.open(tmp_path / "a.png") as picture:
+        assert moving.n_frames > 20
+        moving.seek(moving.n_frames - 1)
+        ends = np.asarray(moving.convert("RGB")).astype(int), np.asarray(picture).astype(int)
+    assert np.abs(ends[0] - ends[1]).mean() < 9
+
+
+@pytest.mark.parametrize("film_name, code, words", [
+    ("a.avi", 2, ".webp"), ("d.json", 2, "over"), ("a.png", 2, "over"), ("none/a.gif", 2, "folder"),
+])  # fmt: skip
+def test_command_refuses_films_that_cannot_be(scribble, tmp_path, capsys, film_name, code, words):
+    save_drawing(scribble, tmp_path / "d.json")
+    line = ["draw", tmp_path / "d.json", tmp_path / "a.png", "--timelapse", tmp_path / film_name]
+    assert cli.main([str(word) for word in line]) == code
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1 and len(list(tmp_path.iterdir())) == 1

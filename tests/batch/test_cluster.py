@@ -13,6 +13,10 @@ import psutil
 import pytest
 from conftest import HERE, ROOT, Desk, photo
 
+from crayonize.batch import Recipe
+from crayonize.batch import cluster as cluster_module
+from crayonize.settings import Settings
+
 pytest.importorskip("distributed")
 
 PATH = os.pathsep.join(map(str, (ROOT / "src", ROOT, HERE)))
@@ -118,8 +122,7 @@ def test_a_lost_scheduler_ends_the_run_and_the_next_goes_on(desk: Desk, cluster:
     desk.finish(30)
 
 
-def test_nobody_there(desk: Desk) -> None:
-    desk.fill(1)
-    run = desk.start("--dask", "tcp://127.0.0.1:9")
-    assert run.end(60) == 1
-    assert "Traceback" not in run.said
+def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_module, "_CONNECTING", 1.0)
+    with pytest.raises(OSError):
+        cluster_module.Cluster("tcp://127.0.0.1:9", Recipe(Settings()), None, 10)
