@@ -133,7 +133,7 @@ class Desk:
     def start(
         self, *words: str, prefix: list[str] | None = None, output: Path | None = None, **how: Any
     ) -> Batch:
-        """Start a batch."""
+        """Start a batch with two workers."""
         if self._before is None:
             self._before = tree(self.photos)
         run = Batch([self.photos], output or self.pictures, ["-j", "2", *words], prefix or [], **how)
@@ -141,8 +141,8 @@ class Desk:
         return run
 
     def run(self, *words: str, **how: Any) -> Batch:
-        """Run a batch to its end."""
-        run = self.start(*words, **how)
+        """Run a batch to its end, with one worker if nothing else is said."""
+        run = self.start("-j", "1", *words, **how)
         run.end()
         return run
 

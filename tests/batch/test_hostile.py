@@ -15,7 +15,7 @@ def test_every_bad_file_gets_its_line(desk: Desk) -> None:
     for name, (content, _) in files.items():
         (desk.photos / name).write_bytes(content)
     photo(desk.photos / "good.png")
-    run = desk.run("--time-limit", "20", "--name", "{name}")
+    run = desk.run("-j", "2", "--time-limit", "20", "--name", "{name}")
     assert run.process.returncode == 3
     found = {line["in"]: line for line in run.lines[:-1]}
     wrong = {
@@ -34,7 +34,7 @@ def test_every_bad_file_gets_its_line(desk: Desk) -> None:
 def test_300_mutations(desk: Desk) -> None:
     for name, content in hostile.mutations(300):
         (desk.photos / name).write_bytes(content)
-    run = desk.run("--time-limit", "20", "--name", "{name}")
+    run = desk.run("-j", "2", "--time-limit", "20", "--name", "{name}")
     account = run.account()
     assert account["counts"]["ok"] + account["counts"]["failed"] == 300, account
     assert account["counts"]["failed"] > 100
