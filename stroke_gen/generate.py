@@ -16,7 +16,7 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 AGREE = 0.45  # tips over which neighbours agree on a recipe
 RAGGED = 0.12  # of all votes: how raggedly one recipe gives way to the next
-FAR_SIGHT = 1.3  # how much a free coat makes up for colours that are off when seen from afar
+FAR_SIGHT = 1.5  # how much a free coat makes up for colours that are off when seen from afar
 Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
 
 
