@@ -261,7 +261,7 @@ def test_plane_is_hatched_inside_its_edge(read):
     middle = np.abs(points - (50, 25))
     assert not ((middle[:, 0] < 9.5) & (middle[:, 1] < 9.5)).any()
     length = sum(float(np.hypot(*np.diff(s.path_mm, axis=0).T).sum()) for s in fill)
-    assert 0.8 < length * 0.62 * fill[0].tip.width_mm / (60 * 40 - 20 * 20) < 1.3
+    assert 0.8 < length * 0.7 * fill[0].tip.width_mm / (60 * 40 - 20 * 20) < 1.3
 
 
 def test_thin_plane_is_drawn_as_a_line(read):

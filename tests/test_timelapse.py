@@ -76,6 +76,11 @@ def test_film_begins_with_bare_paper_and_ends_with_the_drawing(scribble, tmp_pat
     assert np.abs(frames[-1] - reduced(easel)).max() <= 1
 
 
+def test_film_without_shading(scribble, tmp_path):
+    easel, frames = frames_of(scribble, tmp_path, light=False)
+    assert np.abs(frames[-1] - encode_srgb(easel.picture(light=False)).astype(int)).max() <= 1
+
+
 def test_large_drawing_is_shown_reduced_by_area(scribble, tmp_path):
     easel, frames = frames_of(scribble, tmp_path, size=1001)
     assert frames[-1].shape == (300, 500, 3)

@@ -71,7 +71,7 @@ def convert(
 
     settings = settings_of(choices)
     check_outputs([image, *used_files(settings)], out, strokes, timelapse)
-    with filming(timelapse, seconds, show_tip) as watch:
+    with filming(timelapse, seconds, show_tip, light) as watch:
         drawn = sketch(image, settings, progress, watch)
     picture = finish(*drawn, out, strokes, light=light, settings=settings, legend=legend)
     if isinstance(image, np.ndarray):
@@ -167,7 +167,7 @@ def check_outputs(
 
 
 def filming(
-    path: str | os.PathLike[str] | None, seconds: float = 12.0, show_tip: bool = False
+    path: str | os.PathLike[str] | None, seconds: float = 12.0, show_tip: bool = False, light: bool = True
 ) -> AbstractContextManager[Watch | None]:
     """What `sketch` and `redraw` take as `watch` to film the drawing into `path`; nothing for None."""
     if path is None:
@@ -176,7 +176,7 @@ def filming(
     from . import timelapse
 
     cache.keep_kernels()
-    return timelapse.Timelapse(path, seconds, show_tip)
+    return timelapse.Timelapse(path, seconds, show_tip, light)
 
 
 def sketch(

@@ -121,7 +121,7 @@ def _convert(words: Sequence[str]) -> int:
     settings = page.fitted_to(settings, options.print, options.dpi, photo)
     kept = metadata.kept_of(photo, options.metadata)
     with _talk(options) as progress:
-        with api.filming(options.timelapse, options.seconds, options.show_tip) as watch:
+        with api.filming(options.timelapse, options.seconds, options.show_tip, options.light) as watch:
             drawing, easel = api.sketch(options.photo, settings, progress, watch)
         api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings, kept=kept,
                    legend=options.legend)  # fmt: skip
@@ -140,7 +140,7 @@ def _draw(words: Sequence[str]) -> int:
     api.check_outputs([options.drawing], options.out, options.strokes, options.timelapse)
     with _talk(options) as progress:
         given = _strokes(options)
-        with api.filming(options.timelapse, options.seconds, options.show_tip) as watch:
+        with api.filming(options.timelapse, options.seconds, options.show_tip, options.light) as watch:
             drawing, easel = api.redraw(given, options.size, options.threads, options.preview, progress, watch=watch)
         api.finish(drawing, easel, options.out, options.strokes, light=options.light, legend=options.legend)
     if options.verbose:

@@ -110,7 +110,7 @@ def sketch(
     """Plan and draw a photo in linear light (h, w, 3): its Drawing and the sheet it was drawn on."""
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
-    width_mm, height_mm = photo.shape[1] * scale, photo.shape[0] * scale
+    width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
     style = _style(settings)
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
     stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,

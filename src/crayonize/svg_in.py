@@ -31,11 +31,12 @@ SHARP_MM = 1.2  # a finer tip is a sharpened one
 PRESSURE = 0.4  # N/mm^2 under the tip
 LINE_FORCE_N = 1.4  # of a line of mean width, if widths are forces
 THIN_MM = 1.2  # a filled shape thinner than this is a line
-SPACING = 0.62  # of the tip, between two lines of a hatching
+UNEVEN = 0.3  # by which the force of a hatching differs from end to end of its lines
+SPACING = 0.7  # of the tip, between two lines of a hatching
 SAME = 0.04  # OKLab distance up to which a fill counts as bare paper
 GRID_MM = 0.25  # of the map of what covers what
 STEP_MM = 0.5  # between points where visibility is asked
-MOST_FILLED = 30  # times the sheet's area
+MOST_FILLED = 20  # times the sheet's area
 MOST_CROSSED = 200  # times a row crosses the edge of a shape, in the mean; what is shredded finer is not filled
 MAX_POINTS = 2_000_000
 MAX_LENGTH_MM = 3_000_000.0  # of all lines
@@ -177,9 +178,11 @@ def _filled(shape: Shape, number: int, crayon: str, visible: "_Visible") -> Iter
             for path, forces in visible.parts(ring, np.full(len(ring), force * (edge.width_mm / width) ** 2)):
                 yield _stroke(path, forces, crayon, edge, "line")
     if not thin:
+        rng = np.random.default_rng(number)
         turn = np.deg2rad(-50 + 25 * (number * 0.618 % 1))  # no two neighbours quite alike
         for line in _hatching(rings, SPACING * width, turn, 0.4 * width, shape.even_odd):
-            for path, forces in visible.parts(line, np.full(len(line), force)):
+            pressed = force * rng.uniform(1 - UNEVEN, 1 + UNEVEN, len(line))
+            for path, forces in visible.parts(line, pressed):
                 yield _stroke(path, forces, crayon, tip, "fill")
 
 

@@ -48,12 +48,14 @@ Frame = NDArray[np.uint8]
 class Timelapse:
     """Looks on while an Easel is drawn on, and films it; a context manager, whose end completes the file."""
 
-    def __init__(self, path: str | os.PathLike[str], seconds: float = 12.0, show_tip: bool = False) -> None:
-        """path: .webp, .gif, .png, .apng or .mp4. ValueError at once for what cannot be written."""
+    def __init__(
+        self, path: str | os.PathLike[str], seconds: float = 12.0, show_tip: bool = False, light: bool = True
+    ) -> None:
+        """path: .webp, .gif, .png, .apng or .mp4. light: shade the relief. ValueError for what cannot be written."""
         if not 3 <= seconds <= 600:
             raise ValueError(f"seconds: {seconds:g} is not between 3 and 600")
         film.check(path)
-        self.path, self.show_tip = path, show_tip
+        self.path, self.show_tip, self.shaded = path, show_tip, light
         self.steps = round((seconds - FIRST - LAST) * film.FPS)  # frames on which something is drawn
         self._promised, self._planned = 0.0, 0
         self._scenes: list[_Scene] = []
@@ -75,7 +77,7 @@ class Timelapse:
 
     def open(self, easel: "Easel") -> None:
         """Begin the film with the bare sheet on the easel."""
-        self._view = _View(easel)
+        self._view = _View(easel, self.shaded)
         rows, cols = self._view.now.shape[:2]
         first, last = round(FIRST * film.FPS), round(LAST * film.FPS)
         reel = film.Reel(cols, rows, self.steps + 2, first, last, _colours(easel))
@@ -165,9 +167,9 @@ def _along(path: Floats, passed: float) -> Floats:
 class _View:
     """The sheet at the film's size. now, before: (h, w, 3) sRGB, after this frame's strokes and the last's."""
 
-    def __init__(self, easel: "Easel") -> None:
+    def __init__(self, easel: "Easel", shaded: bool) -> None:
         sheet = easel.sheet
-        self.easel = easel
+        self.easel, self.shaded = easel, shaded
         self.factor = 1  # cells a pixel: a power of two, so that tiles are whole pixels
         while max(sheet.rows, sheet.cols) > LONG_SIDE * self.factor and self.factor < TILE:
             self.factor *= 2
@@ -175,7 +177,7 @@ class _View:
         self.side = self.cells // self.factor  # of a square, in pixels
         self.pixels_per_mm = 1 / (self.factor * sheet.cell_mm)
         self.colours = {c.name: _rgb(c.hex) for c in easel.box.palette.crayons}
-        self.light = easel.picture()
+        self.light = easel.picture(shaded)
         self.codes = encode_srgb(np.linspace(0, 1, SHADES, dtype=np.float32))
         rows, cols = max(1, sheet.rows // self.factor), max(1, sheet.cols // self.factor)
         self.now = np.empty((rows, cols, 3), np.uint8)
@@ -194,7 +196,7 @@ class _View:
         low = squares * self.cells
         high = np.minimum(low + self.cells, (sheet.rows, sheet.cols))
         parts = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], 1)
-        optics.render_parts(sheet, self.easel.ground, parts, self.light)
+        optics.render_parts(sheet, self.easel.ground, parts, self.light, light=self.shaded)
         return self.patches(squares)
 
     def patches(self, squares: NDArray[np.int64]) -> Frame:

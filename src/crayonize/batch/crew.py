@@ -29,6 +29,7 @@ from .memory import SHARE
 START_LIMIT = 300.0  # s for a worker to come up: its libraries may lie on a slow disk
 GRACE = 1.0  # s that pictures in work may still take after a stop
 RETRIES, RETRIES_IF_KILLED = 1, 2  # for a job whose worker died; a kill comes from outside, by chance twice
+_KILLED = -9  # exit code of a worker ended by SIGKILL
 _STILLBORN = 3  # workers in a row that may die before they are ready
 _TICK = 1.0  # s between two looks at an idle source of jobs
 
@@ -256,7 +257,7 @@ class Crew:
         if job is None:
             return
         deaths = self._deaths[job] = self._deaths.get(job, 0) + 1
-        if deaths > (RETRIES_IF_KILLED if code == -signal.SIGKILL else RETRIES):
+        if deaths > (RETRIES_IF_KILLED if code == _KILLED else RETRIES):
             del self._deaths[job]
             yield job, Outcome("died", f"{deaths} workers died of it ({_cause(code)})",
                                time.monotonic() - hand.started)  # fmt: skip

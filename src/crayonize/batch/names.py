@@ -47,6 +47,8 @@ def picture_name(name: str, template: str, suffix: str, more: Mapping[str, str])
 
 def folded(name: str) -> str:
     """The form under which equal-looking names are equal."""
+    if name.isascii():
+        return name.lower()
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
@@ -60,13 +62,20 @@ class Places:
     def take(self, out: str, photo: str) -> str | None:
         """Give a photo, named by its path, its place; the photo that is in the way if it is taken."""
         key = folded(out)
-        parents = [str(p) for p in PurePosixPath(key).parents][:-1]
-        for rival in (self._taken.get(key), self._folders.get(key), *map(self._taken.get, parents)):
-            if rival is not None and rival != photo:
-                return rival
+        rival = self._taken.get(key) or self._folders.get(key) or self._in_folders_of(key, photo)
+        if rival is not None and rival != photo:
+            return rival
         self._taken[key] = photo
-        for parent in parents:
-            self._folders.setdefault(parent, photo)
+        return None
+
+    def _in_folders_of(self, key: str, photo: str) -> str | None:
+        """Take the folders that a picture lies in; the photo whose picture is in the way of one."""
+        folder = key.rpartition("/")[0]
+        while folder and folder not in self._folders:
+            if folder in self._taken:
+                return self._taken[folder]
+            self._folders[folder] = photo
+            folder = folder.rpartition("/")[0]
         return None
 
 

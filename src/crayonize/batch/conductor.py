@@ -23,15 +23,15 @@ from .report import Report, ReportError
 from .watch import Watch
 
 
-def run(inputs: Sequence[str], output: str, options: Options, recipe: Recipe, *,
-        render: str | None = None, memory_limit: int | None = None) -> int:  # fmt: skip
-    """Draw all photos of folders or a list into a folder; returns the exit code.
-
-    render: "module:function" in place of `api.sketch`, for tests.   memory_limit: bytes for all workers, in
-    place of what the machine has. ValueError for what the caller can mend before anything is done; OSError if
-    the output folder cannot be used. 0 all done, 1 stopped, 3 some failed, 4 another run holds the folder,
-    128 + n stopped by signal n.
-    """
+def run(
+    inputs: Sequence[str],
+    output: str,
+    options: Options,
+    recipe: Recipe,
+    render: str | None,
+    memory_limit: int | None,
+) -> int:
+    """What batch.run promises."""
     fields = _fields(recipe)
     check_template(options.name, fields)
     paths = sources(inputs)
