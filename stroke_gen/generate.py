@@ -16,6 +16,8 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 AGREE = 0.45  # tips over which neighbours agree on a recipe
 RAGGED = 0.12  # of all votes: how raggedly one recipe gives way to the next
+BOLD = 0.3  # distance from the paper, in OKLab, of the colours of an ordinary picture
+FINE_GAIN = 0.02  # the least gain that no pale picture makes smaller
 FAR_SIGHT = 1.5  # how much a free coat makes up for colours that are off when seen from afar
 Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
 
@@ -39,7 +41,8 @@ def generate(
     fan = style.fan_deg * rng.standard_normal(len(mixes.base)).astype(np.float32)
     scene = replace(scene, tangent=analysis.turned(scene.tangent, fan[group]))
     plan = Plan(scene, swatches, mixes, group, threads)
-    stages = [lambda now, coat=coat: _coat(plan, now, coat, style, rng) for coat in style.passes]
+    boldest = float(np.percentile(np.linalg.norm(scene.lab - oklab(swatches.paper), axis=2), 95))
+    stages = [lambda now, coat=coat: _coat(plan, now, _finer(coat, boldest), style, rng) for coat in style.passes]
     lines = [lambda now: contours.outlines(plan, now, style, rng)]
     strokes: list[Stroke] = []
     now = observe([], group.shape)
@@ -48,6 +51,11 @@ def generate(
         strokes += fresh
         now = observe(fresh, group.shape)
     return strokes
+
+
+def _finer(coat: Pass, boldest: float) -> Pass:
+    """The coat with a smaller least gain where even the boldest colours are near the paper's: fog, snow, high key."""
+    return replace(coat, gain=max(min(coat.gain, FINE_GAIN), coat.gain * min(1.0, boldest / BOLD)))
 
 
 def _coat(plan: Plan, now: Floats, coat: Pass, style: Style, rng: np.random.Generator) -> list[Stroke]:

@@ -15,7 +15,7 @@ from PIL import Image
 from crayonize.batch import memory
 
 ROOT = os.name == "posix" and os.geteuid() == 0
-PHOTOS = 30
+PHOTOS = 24
 
 
 @pytest.mark.parametrize("chance", range(10))
@@ -23,7 +23,7 @@ def test_a_killed_worker_costs_nothing(desk: Desk, dice: random.Random, chance: 
     run = desk.fill(PHOTOS, 0.02).start()
     run.wait_until(run.begun())
     for round_ in range(1 + chance % 2):
-        run.wait_until(run.begun(1 + 12 * round_))  # the same job twice would be taken for its fault
+        run.wait_until(run.begun(1 + 10 * round_))  # the same job twice would be taken for its fault
         time.sleep(dice.random() * 0.15)
         for worker in run.workers()[: 1 + chance // 5]:
             worker.kill()
