@@ -25,3 +25,23 @@ def sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     relaxed = {"reassoc", "nsz"}
     compiled: Callable[..., Any] = numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=relaxed)(function)
     return compiled
+
+
+def inner_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `kernel`, to become part of the kernels that call it, and without counting references.
+
+    It makes no arrays. Counting the references to each array passed costs more than many a small loop, and
+    threads that count those of one array take turns at it.
+    """
+    return _inner(function, inline="always")
+
+
+def inner_sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `sum_kernel`, and without counting references."""
+    return _inner(function, fastmath={"reassoc", "nsz"})
+
+
+def _inner(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+    options |= {"cache": CACHE, "nogil": True, "error_model": "numpy", "_nrt": False}
+    compiled: Callable[..., Any] = numba.njit(**options)(function)
+    return compiled

@@ -84,20 +84,21 @@ def balance(gaps: list[float], wanted: float) -> float:
     return (low + high) / 2
 
 
-def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics):
+def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1):
     """Fig. 7 for all cells in contact at once; changes `over`, returns what the crayon's own wax adds where."""
-    own, others, blends = {}, [], []
+    own, others, blends = {}, {}, []
     for (y, x), overlap in over.items():
         standing = min(columns[y, x].wax(), overlap)
         if standing <= 1e-3:
             continue
         weight = {}
         for dy, dx in NEIGHBOURS:
-            if (y + dy, x + dx) in columns:
+            to = (y + reach * dy, x + reach * dx)
+            if to in columns:
                 distance = math.hypot(dy, dx)
                 cosine = (dx * direction[0] + dy * direction[1]) / distance
-                pull = (alpha * (tops[y, x] - tops[y + dy, x + dx]) + beta * cosine) / distance
-                weight[y + dy, x + dx] = max(0.0, pull)
+                pull = (alpha * (tops[y, x] - tops[to]) + beta * cosine) / distance
+                weight[to] = max(0.0, pull)
         if not sum(weight.values()):
             continue
         over[y, x] -= nu * standing
@@ -108,10 +109,12 @@ def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics):
                 if crayon == wax:
                     own[to] = own.get(to, 0.0) + share * height
                 elif share > 0:
-                    others.append((to, crayon, share * height))
+                    arrives = others.setdefault(crayon, {})
+                    arrives[to] = arrives.get(to, 0.0) + share * height
             blends.append((to, share * from_blend))
-    for to, crayon, height in others:
-        add(columns[to], crayon, height, optics)
+    for crayon, arrives in others.items():
+        for to, height in arrives.items():
+            add(columns[to], crayon, height, optics)
     for to, part in blends:
         columns[to].blend = columns[to].blend + part
     return own
@@ -159,15 +162,15 @@ def under_tip(columns, mask, top, left, firm=1.0):
     }
 
 
-def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, optics):
+def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, optics, reach=1):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
     mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _, heap, firm = (float(c) for c in constants)
     points, mask = points.astype(float), mask.astype(float)
     side = mask.shape[0]
     ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
     walked = np.append(0.0, np.cumsum(ways))
-    steps = max(1, int(walked[-1] / max(1.0, step_cells * (side - 2)) + 0.5))
-    stride = max(walked[-1] / steps, 0.04 * (side - 2))
+    steps = max(1, int(walked[-1] / max(1.0, step_cells * (side - 2 * reach)) + 0.5))
+    stride = max(walked[-1] / steps, 0.04 * (side - 2 * reach))
     given, contact = 0.0, 0
     for n in range(steps):
         along = (n + 0.5) * walked[-1] / steps
@@ -189,7 +192,8 @@ def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, o
         tops = {cell: column.top(firm) for cell, column in columns.items()}
         own = {}
         if smears:
-            own = smear(columns, over, tops, direction, wax, 1 - (1 - nu) ** stride, alpha, beta, optics)
+            own = smear(columns, over, tops, direction, wax, 1 - (1 - nu) ** stride, alpha, beta, optics,
+                        max(1, reach - n % 3))  # fmt: skip
         worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
         given += deposit(columns, over, tops, direction, own, worn, push if push > 0 else force,
                          rate * stride, film, mu_paper, mu_wax, relief, wear, heap)  # fmt: skip

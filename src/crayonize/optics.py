@@ -94,4 +94,5 @@ def render_parts(
 ) -> None:
     """Renew parts (n, 4), each top, bottom, left, right in cells, of a picture `out` that `render` gave earlier."""
     strength = np.float32(LIGHT * 0.1 / sheet.cell_mm * 0.5 if light else 0)
-    _render_parts(parts, np.array(ground, np.float32), strength, *sheet.columns(), out)
+    wax = (sheet.total, sheet.count, sheet.crayon, sheet.layer, sheet.blend, sheet.optics)
+    _render_parts(parts, np.array(ground, np.float32), strength, sheet.paper, *wax, out)

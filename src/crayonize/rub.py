@@ -7,6 +7,7 @@ side. A tip worn flat is turned or sharpened: the next stroke gets a fresh mask.
 """
 
 import functools
+import threading
 import tomllib
 from collections.abc import Callable, Sequence
 from importlib import resources
@@ -17,8 +18,9 @@ from numpy.typing import NDArray
 from stroke_gen.drawing import Stroke, Tip
 
 from . import schedule, tip
+from .contact import _rub, window
 from .palette import Palette
-from .wax import Physics, Sheet, _rub
+from .wax import Physics, Sheet
 
 STEP = 0.14  # of the tip's width, between two contacts: below the wavelength of the bumps
 SHARPEN_UM = 36.0  # mean height lost before a tip is turned or sharpened
@@ -45,6 +47,7 @@ class Box:
 
     def __init__(self, palette: Palette, constants: Physics, cell_mm: float, seed: int = 0) -> None:
         self.palette, self.constants, self.cell_mm, self.seed = palette, constants, cell_mm, seed
+        self.reach = constants.reach(cell_mm)
         self.worn_um: dict[tuple[str, Tip], float] = {}
         self.given_mm3: dict[str, float] = {}
         self._index: dict[tuple[Tip, int, int, int], int] = {}
@@ -68,7 +71,7 @@ class Box:
         rng = np.random.default_rng([self.seed, 11, face])
         worn_um = level / WEAR_LEVELS * SHARPEN_UM
         turned = tip.mask(shape, self.cell_mm, worn_um, rng, np.pi * heading / HEADINGS)
-        return np.pad(turned, 1, constant_values=tip.ABSENT)
+        return np.pad(turned, self.reach, constant_values=tip.ABSENT)
 
     def stacked(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """All masks as rows of one array, and the side of each."""
@@ -112,14 +115,17 @@ def rub(
     reach = (side_of / 2 + 2).astype(np.float32)
     order = schedule.order(points, first, reach, sheet.rows, sheet.cols)
     drawn = watch(points, first, reach) if watch else None
-    cost = (cells / np.maximum(1, STEP * (side_of - 2)) + 1) * side_of**2
+    cost = (cells / np.maximum(1, STEP * (side_of - 2 * box.reach)) + 1) * side_of**2
     loss = np.zeros(len(strokes), np.float64)
     constants = box.constants.constants(sheet.cell_mm)
     per_lambda = np.float32(1 / (box.constants.lam * sheet.cell_mm**2))
+    columns, desk = sheet.columns(), threading.local()
 
     def draw(picked: NDArray[np.int64]) -> None:
-        _rub(picked, points, first, wax_of, mask_of, masks, sides, np.float32(STEP), smears, constants, per_lambda,
-             sheet.rows, sheet.cols, *sheet.columns(), loss)  # fmt: skip
+        if not hasattr(desk, "window"):
+            desk.window = window(masks.shape[1], len(sheet.optics))
+        _rub(picked, points, first, wax_of, mask_of, masks, sides, box.reach, np.float32(STEP), smears, constants,
+             per_lambda, sheet.rows, sheet.cols, columns, loss, desk.window)  # fmt: skip
         if drawn:
             drawn(picked)
 
