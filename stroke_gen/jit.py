@@ -27,21 +27,26 @@ def sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return compiled
 
 
-def inner_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """As `kernel`, to become part of the kernels that call it, and without counting references.
+def lean_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `kernel`, for one that makes no arrays: it counts no references.
 
-    It makes no arrays. Counting the references to each array passed costs more than many a small loop, and
-    threads that count those of one array take turns at it.
+    Counting the references to each array passed costs more than many a small loop, and threads that count
+    those of one array take turns at it.
     """
-    return _inner(function, inline="always")
+    return _lean(function)
 
 
-def inner_sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+def inner_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `lean_kernel`, to become part of the kernels that call it."""
+    return _lean(function, inline="always")
+
+
+def lean_sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """As `sum_kernel`, and without counting references."""
-    return _inner(function, fastmath={"reassoc", "nsz"})
+    return _lean(function, fastmath={"reassoc", "nsz"})
 
 
-def _inner(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+def _lean(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
     options |= {"cache": CACHE, "nogil": True, "error_model": "numpy", "_nrt": False}
     compiled: Callable[..., Any] = numba.njit(**options)(function)
     return compiled

@@ -162,22 +162,28 @@ def under_tip(columns, mask, top, left, firm=1.0):
     }
 
 
-def rub(columns, points, mask, wax, step_cells, smears, constants, per_lambda, optics, reach=1):
+def contacts(points, stride):
+    """Where a stroke touches: x, y, force and direction half a stride from its start and at every stride on."""
+    ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    walked = np.append(0.0, np.cumsum(ways))
+    for along in np.arange(0.5 * stride, walked[-1], stride):
+        segment = int(np.searchsorted(walked[1:-1], along, "right"))
+        step = points[segment + 1, :2] - points[segment, :2]
+        yield [float(np.interp(along, walked, points[:, c])) for c in range(3)], step / ways[segment]
+
+
+def rub(columns, points, mask, wax, step, smears, constants, per_lambda, optics, reach=1):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
     mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _, heap, firm = (float(c) for c in constants)
     points, mask = points.astype(float), mask.astype(float)
     side = mask.shape[0]
-    ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    walked = np.append(0.0, np.cumsum(ways))
-    steps = max(1, int(walked[-1] / max(1.0, step_cells * (side - 2 * reach)) + 0.5))
-    stride = max(walked[-1] / steps, 0.04 * (side - 2 * reach))
+    stride = max(1.0, step * (side - 2 * reach))
+    touches = list(contacts(points, stride))
+    if not touches:
+        length = np.hypot(*np.diff(points[:, :2], axis=0).T).sum()
+        stride, touches = max(length, 0.04 * (side - 2 * reach)), [(points[-1].tolist(), (1.0, 0.0))]
     given, contact = 0.0, 0
-    for n in range(steps):
-        along = (n + 0.5) * walked[-1] / steps
-        x, y, force = (float(np.interp(along, walked, points[:, c])) for c in range(3))
-        segment = int(np.searchsorted(walked[1:-1], along))
-        moving = len(ways) > 0 and ways[segment] > 0
-        direction = (points[segment + 1, :2] - points[segment, :2]) / ways[segment] if moving else (1.0, 0.0)
+    for n, ((x, y, force), direction) in enumerate(touches):
         if force <= 0:
             continue
         dither_x, dither_y = (0.5 + contact * 0.7548776662) % 1, (0.5 + contact * 0.5698402910) % 1

@@ -13,17 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stroke_gen.jit import inner_kernel, inner_sum_kernel
+from stroke_gen.jit import inner_kernel, lean_kernel, lean_sum_kernel
 
 LAYERS = 4  # pure layers a cell
 BLEND = 7  # height, then k*h and s*h for red, green, blue
 NONE = 255  # no slot
+HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS = range(6)  # what `hand` holds
 
 Floats = NDArray[np.float32]
 
 
 class Window(NamedTuple):
-    """A thread's work space. All but the last four hold a value for each cell of the window, row by row.
+    """A thread's work space. All but the last five hold a value for each cell of the window, row by row.
 
     Wax on its way is sorted by crayon: each crayon met at a contact gets a slot, the one in hand slot 0.
     """
@@ -44,6 +45,7 @@ class Window(NamedTuple):
     crayon_of: NDArray[np.uint8]  # by slot
     begin: NDArray[np.int64]  # by slot: cells between which it holds anything
     end: NDArray[np.int64]
+    hand: NDArray[np.float64]  # the stroke so far: height of the tip, offsets, strides to the next contact, ...
 
 
 def window(cells: int, crayons: int) -> Window:
@@ -61,7 +63,7 @@ def window(cells: int, crayons: int) -> Window:
         mask=floats(1), surface=floats(1), film=floats(1), over=floats(1), weights=floats(1), weight=floats(8),
         broken=floats(1), blended=floats(BLEND), taken=floats(slots), arriving=floats(slots),
         slot_of=numbers(np.uint8, 256, NONE), crayon_of=numbers(np.uint8, 256),
-        begin=numbers(np.int64, 256), end=numbers(np.int64, 256),
+        begin=numbers(np.int64, 256), end=numbers(np.int64, 256), hand=numbers(np.float64, 6),
     )  # fmt: skip
 
 
@@ -74,7 +76,7 @@ def _whole(number):  # type: ignore[no-untyped-def]
     return np.int64(np.uint32(number))
 
 
-@inner_sum_kernel
+@lean_sum_kernel
 def _force(gap, h):  # type: ignore[no-untyped-def]
     """Sum and number of the overlaps max(0, gap - h): the force of Eq. 2 in units of lambda."""
     total = np.float32(0)
@@ -133,7 +135,7 @@ def _break_off(here, ahead, aside, slant, over, film, inflow, push, rate, thick,
         broken[i] = given if over[i] > 0 and slope > 0 and room > 0 else np.float32(0)
 
 
-@inner_sum_kernel
+@lean_sum_kernel
 def _wear(broken, wear, inflow, mask):  # type: ignore[no-untyped-def]
     """Make what broke off ready to be laid, and deepen the mask by `wear` of it; returns its sum."""
     lost = np.float32(0)
@@ -417,80 +419,109 @@ def _deposit(w, side, reach, vx, vy, push, rate, thick, mu_paper, mu_wax, relief
     return _wear(broken, wear, inflow, w.mask[a:b])
 
 
+# ---- strokes -----------------------------------------------------------------------------------------------
+
+
 @inner_kernel
-def _rub(picked, points, first, wax_of, mask_of, masks, sides, reach, step_cells, smears, constants, per_lambda,  # type: ignore[no-untyped-def]
+def _press(w, mask, side, cols):  # type: ignore[no-untyped-def]
+    """Put a tip on a sheet `cols` cells wide: the beginning of a stroke; returns how many cells the tip has."""
+    present = 0
+    for j in range(side):
+        for i in range(side):
+            at = j * side + i
+            w.where[at] = j * cols + i
+            w.mask[at] = mask[at]
+            present += int(mask[at] < np.float32(1e8))
+    w.hand[:] = 0.5
+    w.hand[HEIGHT] = 1e9  # lifted: from far below, float32 would miss the paper
+    w.hand[WALKED] = w.hand[CONTACTS] = 0
+    return present
+
+
+@lean_kernel
+def _contact(w, wax, side, reach, present, x, y, force, vx, vy, stride, smears, constants, per_lambda,  # type: ignore[no-untyped-def]
+             rows, cols, columns):  # fmt: skip
+    """One contact, for `stride` cells of the way: adjust the height, smear, deposit (Fig. 3); returns the wax given."""
+    hop = max(1, reach - np.int64(w.hand[CONTACTS]) % 3)  # one length only would part the cells into lattices
+    w.hand[CONTACTS] += 1
+    if force <= 0:
+        return np.float32(0)
+    # Rounding to whole cells by an even sequence of offsets leaves no stair steps.
+    left = int(np.floor(x - 0.5 + w.hand[DITHER_X])) - side // 2
+    top = int(np.floor(y - 0.5 + w.hand[DITHER_Y])) - side // 2
+    w.hand[DITHER_X] = (w.hand[DITHER_X] + 0.7548776662) % 1.0
+    w.hand[DITHER_Y] = (w.hand[DITHER_Y] + 0.5698402910) % 1.0
+    mu_paper, mu_wax, thick, rate_cell = constants[0], constants[1], constants[2], constants[3]
+    push, relief, nu_cell, alpha = constants[4], constants[5], constants[6], constants[7]
+    beta, epsilon, wear, thin = constants[8], constants[9], constants[10], constants[11]
+    heap, firm = constants[12], constants[13]
+    inside = _look(w, side, present, top, left, rows, cols, firm, columns)
+    if inside <= 0:
+        return np.float32(0)
+    wanted = force * per_lambda * inside
+    cells = side * side
+    h = _balance(w.over[:cells], wanted, np.float32(w.hand[HEIGHT]), min(epsilon, np.float32(0.01) * wanted))
+    w.hand[HEIGHT] = h
+    _overlap(w.over[:cells], h)
+    home, slots = top * cols + left, 1
+    _open(w, cells, 0, wax, 0)
+    w.end[0] = cells
+    if smears:
+        _weigh(w, side, hop, vx, vy, alpha, beta)
+        slots = _smear(w, side, hop, home, np.float32(1) - (np.float32(1) - nu_cell) ** stride, columns)
+    given = _deposit(w, side, reach, vx, vy, push if push > 0 else force, rate_cell * stride, thick, mu_paper, mu_wax,
+                     relief, wear, heap)  # fmt: skip
+    _settle(w, slots, home, thin, columns)
+    return given
+
+
+@inner_kernel
+def _move(w, wax, side, reach, present, a, b, step, smears, constants, per_lambda, rows, cols, columns):  # type: ignore[no-untyped-def]
+    """Draw on from point a to point b, each x, y in cells and force: a contact every so many cells; returns the wax.
+
+    step: cells from one contact to the next as a share of the tip's width, at least one cell.
+    """
+    stride = max(np.float32(1), step * np.float32(side - 2 * reach))
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    length = np.hypot(dx, dy)
+    given, ahead = 0.0, np.float32(w.hand[AHEAD]) * stride
+    while ahead < length:
+        t = ahead / length
+        given += _contact(w, wax, side, reach, present, a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]),
+                          dx / length, dy / length, stride, smears, constants, per_lambda, rows, cols,
+                          columns)  # fmt: skip
+        ahead += stride
+    w.hand[AHEAD] = (ahead - length) / stride
+    w.hand[WALKED] += length
+    return given
+
+
+@inner_kernel
+def _lift(w, wax, side, reach, present, b, smears, constants, per_lambda, rows, cols, columns):  # type: ignore[no-untyped-def]
+    """End a stroke at point b; one so short that nothing touched becomes a dab. Returns the wax given."""
+    if w.hand[CONTACTS] > 0:
+        return 0.0
+    slides = max(np.float32(w.hand[WALKED]), np.float32(0.04) * np.float32(side - 2 * reach))  # by 1/25 of the tip
+    return np.float64(_contact(w, wax, side, reach, present, b[0], b[1], b[2], np.float32(1), np.float32(0), slides,
+                               smears, constants, per_lambda, rows, cols, columns))  # fmt: skip
+
+
+@lean_kernel
+def _rub(picked, points, first, wax_of, mask_of, masks, sides, reach, step, smears, constants, per_lambda,  # type: ignore[no-untyped-def]
          rows, cols, columns, loss, w):  # fmt: skip
-    """Draw the strokes `picked`, one after another (Fig. 3): adjust the height, smear, deposit.
+    """Draw the strokes `picked`, one after another.
 
     points (n, 3): x, y in cells, force in N; first (strokes + 1): where each stroke's points begin; masks
     (tips, cells): masks with a border of `reach` ABSENT cells, `sides` long; loss (strokes,): wax given.
     Smeared wax goes `reach` cells at one contact, one and two fewer at the next ones, at least one.
     """
-    mu_paper, mu_wax, thick, rate_cell = constants[0], constants[1], constants[2], constants[3]
-    push, relief, nu_cell, alpha = constants[4], constants[5], constants[6], constants[7]
-    beta, epsilon, wear, thin = constants[8], constants[9], constants[10], constants[11]
-    heap, firm = constants[12], constants[13]
     for s in picked:
-        tip, wax = mask_of[s], np.uint8(wax_of[s])
-        side = sides[tip]
-        cells, wide = side * side, side - 2 * reach
-        present = 0
-        for i in range(cells):
-            w.mask[i] = masks[tip, i]
-            present += masks[tip, i] < np.float32(1e8)
-        for j in range(side):
-            for i in range(side):
-                w.where[j * side + i] = j * cols + i
-        a, b = first[s], first[s + 1]
-        length = np.float32(0)
-        for i in range(a + 1, b):
-            length += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
-        steps = max(1, int(length / max(np.float32(1), step_cells * wide) + np.float32(0.5)))
-        stride = max(np.float32(length / steps), np.float32(0.04) * np.float32(wide))  # a dab slides by 1/25 of the tip
-        stride = np.float32(stride)
-        rate = rate_cell * stride
-        nu = np.float32(1) - (np.float32(1) - nu_cell) ** stride
-        h = np.float32(1e9)  # lifted: from far below, float32 would miss the paper
+        side, wax = sides[mask_of[s]], np.uint8(wax_of[s])
+        present = _press(w, masks[mask_of[s]], side, cols)
         given = 0.0
-        i, walked, seg = a, np.float32(0), np.float32(0)
-        vx, vy = np.float32(1), np.float32(0)
-        dither_x, dither_y = 0.5, 0.5
-        for n in range(steps):
-            along = (n + np.float32(0.5)) * length / steps
-            while i + 1 < b:
-                dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
-                seg = np.hypot(dx, dy)
-                if walked + seg >= along or i + 2 >= b:
-                    if seg > 0:
-                        vx, vy = np.float32(dx / seg), np.float32(dy / seg)
-                    break
-                walked += seg
-                i += 1
-            t = np.float32(min(np.float32(1), (along - walked) / seg)) if seg > 0 and i + 1 < b else np.float32(0)
-            j = min(i + 1, b - 1)
-            x = points[i, 0] + t * (points[j, 0] - points[i, 0])
-            y = points[i, 1] + t * (points[j, 1] - points[i, 1])
-            force = points[i, 2] + t * (points[j, 2] - points[i, 2])
-            if force <= 0:
-                continue
-            # Rounding to whole cells by an even sequence of offsets leaves no stair steps.
-            left = int(np.floor(x - 0.5 + dither_x)) - side // 2
-            top = int(np.floor(y - 0.5 + dither_y)) - side // 2
-            dither_x, dither_y = (dither_x + 0.7548776662) % 1.0, (dither_y + 0.5698402910) % 1.0
-            inside = _look(w, side, present, top, left, rows, cols, firm, columns)
-            if inside <= 0:
-                continue
-            wanted = force * per_lambda * inside
-            h = _balance(w.over[:cells], wanted, h, min(epsilon, np.float32(0.01) * wanted))
-            _overlap(w.over[:cells], h)
-            home, slots = top * cols + left, 1
-            _open(w, cells, 0, wax, 0)
-            w.end[0] = cells
-            if smears:
-                hop = max(1, reach - n % 3)  # one length only would part the cells into lattices
-                _weigh(w, side, hop, vx, vy, alpha, beta)
-                slots = _smear(w, side, hop, home, nu, columns)
-            given += _deposit(w, side, reach, vx, vy, push if push > 0 else force, rate, thick, mu_paper, mu_wax,
-                              relief, wear, heap)  # fmt: skip
-            _settle(w, slots, home, thin, columns)
+        for i in range(first[s] + 1, first[s + 1]):
+            given += _move(w, wax, side, reach, present, points[i - 1], points[i], step, smears, constants,
+                           per_lambda, rows, cols, columns)  # fmt: skip
+        given += _lift(w, wax, side, reach, present, points[first[s + 1] - 1], smears, constants, per_lambda,
+                       rows, cols, columns)  # fmt: skip
         loss[s] = given
