@@ -10,7 +10,7 @@ KINDS = ("sharp", "blunt", "rim", "side")
 
 
 def made(kind="blunt", width_mm=2.4, cell_mm=0.1, worn_um=0.0, angle_deg=0.0, seed=0):
-    return tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, worn_um, np.random.default_rng(seed))
+    return tip.worn(tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed)), worn_um)
 
 
 def extent_mm(mask, cell_mm):
@@ -115,4 +115,4 @@ def test_a_tip_finer_than_a_cell_still_touches(kind):
 )
 def test_a_wrong_tip_is_named(wrong, message):
     with pytest.raises(ValueError, match=message):
-        tip.mask(wrong, 0.1, 0.0, np.random.default_rng(0))
+        tip.mask(wrong, 0.1, np.random.default_rng(0))

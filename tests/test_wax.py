@@ -293,7 +293,7 @@ def test_the_force_is_reached_over_five_decades(bench, kind, teeth):
     for trial in range(8):
         sheet = bench.felt(40, 40, seed=trial)
         sheet.total[:] = teeth * 45 * rng.random(sheet.total.size)
-        mask = np.pad(tip_mask(Tip(kind, 1.6), 0.1, 0.0, rng), 1, constant_values=ABSENT)
+        mask = np.pad(tip_mask(Tip(kind, 1.6), 0.1, rng), 1, constant_values=ABSENT)
         window = Window(sheet, mask, 9, 9, 1.0)
         for start, wanted in itertools.product((np.float32(1e9), window.h), np.float32(10.0) ** np.arange(0, 5.1)):
             allowed = min(epsilon, 0.01 * wanted)

@@ -51,6 +51,7 @@ class Box:
         self.worn_um: dict[tuple[str, Tip], float] = {}
         self.given_mm3: dict[str, float] = {}
         self._index: dict[tuple[Tip, int, int, int], int] = {}
+        self._fresh: dict[tuple[Tip, int, int], NDArray[np.float32]] = {}
         self.masks: list[NDArray[np.float32]] = []
 
     def take(self, stroke: Stroke, newton_mm: float, heading: int) -> int:
@@ -68,10 +69,12 @@ class Box:
         return self._index[shape]
 
     def _mask(self, shape: Tip, face: int, level: int, heading: int) -> NDArray[np.float32]:
-        rng = np.random.default_rng([self.seed, 11, face])
-        worn_um = level / WEAR_LEVELS * SHARPEN_UM
-        turned = tip.mask(shape, self.cell_mm, worn_um, rng, np.pi * heading / HEADINGS)
-        return np.pad(turned, self.reach, constant_values=tip.ABSENT)
+        key = (shape, face, heading)
+        if key not in self._fresh:
+            rng = np.random.default_rng([self.seed, 11, face])
+            turned = tip.mask(shape, self.cell_mm, rng, np.pi * heading / HEADINGS)
+            self._fresh[key] = np.pad(turned, self.reach, constant_values=tip.ABSENT)
+        return tip.worn(self._fresh[key], level / WEAR_LEVELS * SHARPEN_UM)
 
     def stacked(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """All masks as rows of one array, and the side of each."""

@@ -23,13 +23,10 @@ SIDE_MM = 2.6  # breadth of the strip on which a lying crayon touches the paper
 DROPS_UM = {"sharp": 110.0, "blunt": 32.0, "rim": 60.0, "side": 40.0}  # centre to edge
 
 
-def mask(
-    tip: "Tip", cell_mm: float, worn_um: float, rng: np.random.Generator, heading_rad: float = 0.0
-) -> NDArray[np.float32]:
-    """The mask of a tip on a grid of `cell_mm`, after `worn_um` of its height has been rubbed off.
+def mask(tip: "Tip", cell_mm: float, rng: np.random.Generator, heading_rad: float = 0.0) -> NDArray[np.float32]:
+    """The mask of a fresh tip on a grid of `cell_mm`, with grooves along `heading_rad`, the way it moves.
 
-    Returns (n, n) float32 in um with n odd, the lowest present cell at 0. Wear cuts the profile flat
-    from below, as drawing does, and leaves grooves along `heading_rad`, the way the crayon has moved.
+    Returns (n, n) float32 in um with n odd, the lowest present cell at 0.
     """
     if tip.kind not in DROPS_UM:
         raise ValueError(f"tip.kind: {tip.kind!r} is none of {', '.join(DROPS_UM)}")
@@ -44,9 +41,12 @@ def mask(
     rise, present = _profile(tip, along, across, radius)
     present[n // 2, n // 2] |= not present.any()  # finer than a cell
     height = DROPS_UM[tip.kind] * rise + BUMP_UM * _bumps(n, BUMP_MM / cell_mm, heading_rad, rng)
-    height = np.maximum(height, height[present].min() + worn_um)
-    height -= height[present].min()
-    return np.where(present, height, ABSENT).astype(np.float32)
+    return np.where(present, height - height[present].min(), ABSENT).astype(np.float32)
+
+
+def worn(mask: NDArray[np.float32], worn_um: float) -> NDArray[np.float32]:
+    """A mask after `worn_um` of its height has been rubbed off: drawing cuts the profile flat from below."""
+    return np.where(mask < ABSENT, np.maximum(mask - np.float32(worn_um), 0), ABSENT)
 
 
 def _profile(
