@@ -109,6 +109,14 @@ def test_four_threads_and_q_give_the_same_bytes_in_silence(drawn, photo):
     assert (folder / "four.png").read_bytes() == (folder / "one.png").read_bytes()
 
 
+def test_own_pictures_are_written_over_and_others_when_o_names_them(photo, run, tmp_path):
+    for suffix in ("png", "jpg"):
+        out = tmp_path / f"out.{suffix}"
+        out.write_bytes(photo.read_bytes())
+        assert run(photo, "-o", out, "--size", 40, "--preview")[0] == 0
+        assert run(photo, out, "--size", 40, "--preview")[0] == 0
+
+
 def test_saved_strokes_give_the_same_picture(drawn, run):
     folder = drawn[0]
     assert run("draw", folder / "strokes.json", folder / "again.png", "--size", 200) == (0, "", "")
@@ -149,6 +157,7 @@ BAD = [
     (2, [PHOTO, PHOTO], "photo.jpg", "over"),
     (2, [PHOTO, "{tmp}/link.png"], "link.png", "over"),
     (2, [PHOTO, "{tmp}/hard.png"], "hard.png", "over"),
+    (2, [PHOTO, "{tmp}/second.jpg"], "second.jpg", "-o"),
     (2, [PHOTO, "{tmp}/missing/out.png"], "missing", "folder"),
     (2, [PHOTO, "{tmp}/out.gif"], ".gif", ".png"),
     (2, [PHOTO, "{tmp}/out"], "suffix", ".png"),
@@ -202,6 +211,7 @@ def desk(tmp_path, photo):
     (tmp_path / "folder.png").mkdir()
     (tmp_path / "link.png").symlink_to(photo)
     (tmp_path / "hard.png").hardlink_to(photo)
+    (tmp_path / "second.jpg").write_bytes(photo.read_bytes())
     return tmp_path
 
 

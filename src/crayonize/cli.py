@@ -118,6 +118,8 @@ def _convert(words: Sequence[str]) -> int:
     out = options.out or options.output or photo.with_name(f"{photo.stem}.crayon.png")
     batch.check_alone(options)
     api.check_outputs([photo, *api.used_files(settings)], out, options.strokes, options.timelapse)
+    if options.out is not None:
+        _spare_photo(options.out)
     settings = page.fitted_to(settings, options.print, options.dpi, photo)
     kept = metadata.kept_of(photo, options.metadata)
     with _talk(options) as progress:
@@ -128,6 +130,15 @@ def _convert(words: Sequence[str]) -> int:
     if options.verbose or (options.out is None and not options.quiet):
         _report(out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
+
+
+def _spare_photo(out: str) -> None:
+    """ValueError if what is to be written over may be a photo: `crayonize *.jpg` can come to two names."""
+    from .image_write import holds_other_picture
+
+    if holds_other_picture(out):
+        advice = f"to draw it too, name a folder with -o; to replace it, say -o {out}"
+        raise ValueError(f"{out}: is a picture that was not drawn here; {advice}")
 
 
 def _draw(words: Sequence[str]) -> int:

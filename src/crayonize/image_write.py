@@ -84,6 +84,16 @@ def read_settings(path: str | os.PathLike[str]) -> Settings:
     return found if isinstance(found, dict) else {}
 
 
+def holds_other_picture(path: str | os.PathLike[str]) -> bool:
+    """Whether there is a picture here that write_image did not write."""
+    try:
+        with open_picture(path) as (picture, _):
+            by = picture.info.get("Software") if picture.format == "PNG" else exif_tag(picture, _EXIF_SOFTWARE)
+            return by != SOFTWARE
+    except (OSError, ValueError):
+        return False
+
+
 def _check_target(target: Path) -> None:
     """Refuse what os.replace would fail on, or destroy: folders, devices, pipes."""
     if not target.parent.is_dir():
@@ -132,6 +142,7 @@ def _options(
     """What Pillow's writer of each format is to be told. text: the settings as JSON (ASCII)."""
     options: dict[str, Any] = {"icc_profile": _srgb_profile()}
     if format_ == "PNG":
+        options["compress_level"] = 2  # grain hardly packs: more takes thrice the time and saves nothing
         options["pnginfo"] = notes = PngImagePlugin.PngInfo()
         notes.add_text("Software", SOFTWARE)
         if text is not None:
