@@ -52,17 +52,16 @@ def _touch(points, first, reach, s, rows, cols, tile, mark, found):  # type: ign
 
 
 @kernel
-def _order(points, first, reach, rows, cols, tile, waits, heirs_first, heirs):  # type: ignore[no-untyped-def]
-    """Fill waits, heirs_first and heirs (if it has room for any); returns how many heirs there are."""
+def _order(points, first, reach, rows, cols, tile):  # type: ignore[no-untyped-def]
+    """How many strokes each waits for, where its heirs begin, and the heirs."""
     tiles_y, tiles_x = -(-rows // tile), -(-cols // tile)
     mark = np.full((tiles_y, tiles_x), -1, np.int32)
     found = np.empty(tiles_y * tiles_x, np.int32)
     last = np.full(tiles_y * tiles_x, -1, np.int32)
     strokes = first.size - 1
     heir = np.full(strokes, -1, np.int32)  # the latest stroke known to wait for each
-    filled = np.zeros(strokes, np.int64)
-    total = 0
-    waits[:] = 0
+    waits, begins = np.zeros(strokes, np.int32), np.zeros(strokes + 1, np.int64)
+    pairs, known = np.empty((8 * strokes, 2), np.int32), 0  # one waited for, and one that waits
     for s in range(strokes):
         for n in range(_touch(points, first, reach, s, rows, cols, tile, mark, found)):
             before = last[found[n]]
@@ -70,14 +69,19 @@ def _order(points, first, reach, rows, cols, tile, waits, heirs_first, heirs):  
             if before >= 0 and heir[before] != s:
                 heir[before] = s
                 waits[s] += 1
-                if heirs.size:
-                    heirs[heirs_first[before] + filled[before]] = s
-                filled[before] += 1
-                total += 1
-    heirs_first[0] = 0
+                begins[before + 1] += 1
+                if known == len(pairs):
+                    pairs = np.concatenate((pairs, np.empty_like(pairs)))
+                pairs[known, 0], pairs[known, 1] = before, s
+                known += 1
     for s in range(strokes):
-        heirs_first[s + 1] = heirs_first[s] + filled[s]
-    return total
+        begins[s + 1] += begins[s]
+    heirs, filled = np.empty(known, np.int32), begins.copy()
+    for i in range(known):
+        before = pairs[i, 0]
+        heirs[filled[before]] = pairs[i, 1]
+        filled[before] += 1
+    return waits, begins, heirs
 
 
 def order(
@@ -87,12 +91,7 @@ def order(
 
     A path between two points is sampled once a tile, so `reach` is widened by half a tile.
     """
-    widened = (reach + TILE // 2).astype(np.float32)
-    waits, heirs_first = np.empty(first.size - 1, np.int32), np.empty(first.size, np.int64)
-    given = (points, first, widened, rows, cols, TILE, waits, heirs_first)
-    heirs = np.empty(_order(*given, np.empty(0, np.int32)), np.int32)
-    _order(*given, heirs)
-    return Order(waits, heirs_first, heirs)
+    return Order(*_order(points, first, (reach + TILE // 2).astype(np.float32), rows, cols, TILE))
 
 
 class _Crew:
