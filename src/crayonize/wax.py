@@ -1,4 +1,4 @@
-"""Wax on a sheet: force balance, smearing and frictional deposition (section 3 of the paper).
+"""Wax on a sheet, and the constants it obeys (section 3 of the paper).
 
 A sheet is a height field (the paper's tooth) with a column of wax on each cell: up to four layers of
 pure crayons, top last, over one blend into which the lowest layer sinks when a fifth is laid.
