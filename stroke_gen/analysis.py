@@ -4,7 +4,11 @@ All maps live on the work grid, a few cells to a crayon's width, whatever the si
 """
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,6 +24,7 @@ WORK_LONG = 640  # cells along the work grid's long side
 CALM = 0.6  # tips: windows over which colours are calmed
 RIM = 0.005  # of the long side: a frame that is not drawn
 FACE_SIDE = 320  # pixels in which faces are looked for
+WIDE = 3.0  # cells: wide enough a bell to look smooth on its grid
 WARM = np.deg2rad(58)  # OKLab hue of skin
 
 
@@ -34,6 +39,11 @@ class Scene:
     coherence: Floats  # (h, w) 0 no direction of its own .. 1 one clear direction
     detail: Floats  # (h, w) 0 plain .. 1 eyes, lettering, edges
     cell_mm: float
+
+    @cached_property
+    def afar(self) -> Floats:
+        """The target as the eye sees it from across the room, OKLab."""
+        return far(self.target)
 
 
 def work_shape(width_mm: float, height_mm: float) -> tuple[int, int]:
@@ -56,14 +66,28 @@ def blur(image: Floats, sigma: float) -> Floats:
     return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_REFLECT), np.float32)
 
 
+def wide_blur(image: Floats, sigma: float) -> Floats:
+    """As `blur`, to a hundredth or so: a wide bell is laid on a grid as coarse as it bears."""
+    shrink = int(sigma / WIDE)
+    if shrink < 2:
+        return blur(image, sigma)
+    h, w = image.shape[:2]
+    size = -(-w // shrink), -(-h // shrink)
+    coarse = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
+    # Taking means and going back are themselves as wide as a bell of this variance.
+    coarse = blur(coarse, np.sqrt(sigma**2 - shrink**2 / 4) / shrink)
+    return np.asarray(cv2.resize(coarse, (w, h), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
 def far(linear: Floats) -> Floats:
     """OKLab (h, w, 3) of a picture as the eye sees it from across the room."""
-    return oklab(blur(linear, 0.012 * max(linear.shape)))
+    return oklab(wide_blur(linear, 0.012 * max(linear.shape)))
 
 
 def read(
-    photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, focus: Sequence[Box]
-) -> Scene:
+    photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, focus: Sequence[Box],
+    pool: Executor,
+) -> Scene:  # fmt: skip
     """Analyse a photo in linear light for a sheet of the given size, as far as these crayons can draw it.
 
     focus: boxes (x, y, w, h) in fractions of the picture that deserve care.
@@ -72,10 +96,11 @@ def read(
     tip = style.tip_mm / cell_mm
     seen = unframed(fit(photo, work_shape(width_mm, height_mm)))
     lab = tone_map(oklab(seen), swatches, style)
+    care = pool.submit(lambda: detail(lab, tip, [*focus, *faces(seen)]))
     target = from_oklab(lab)
     calm = calmed(target, max(1, round(CALM * tip)))
     tangent, coherence = orientation(oklab(calm), tip, np.deg2rad(style.wrist_deg), style.wrist)
-    return Scene(target, lab, calm, tangent, coherence, detail(lab, tip, [*focus, *faces(seen)]), cell_mm)
+    return Scene(target, lab, calm, tangent, coherence, care.result(), cell_mm)
 
 
 def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tuple[Floats, Floats]:
@@ -86,14 +111,14 @@ def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tupl
     """
     smooth = blur(lab, 0.35 * tip)
     gx, gy = _scharr(smooth, 1, 0), _scharr(smooth, 0, 1)
-    e, f, g = (gx * gx).sum(2), (gx * gy).sum(2), (gy * gy).sum(2)
+    e, f, g = _sum(gx * gx), _sum(gx * gy), _sum(gy * gy)
     cap = np.float32(np.percentile(e + g, 98)) + np.float32(1e-8)
     limit = np.minimum(1, cap / (e + g + 1e-8))
     # The stroke runs along the edge: the double angle of the gradient, turned by half a turn.
     tensor = np.dstack([(g - e) * limit, -2 * f * limit, (e + g) * limit]).astype(np.float32)
     total = np.zeros_like(tensor)
     for share, scale in ((1.0, 0.5), (0.6, 1.6), (0.3, 5.0)):
-        total += np.float32(share) * blur(tensor, scale * tip)
+        total += np.float32(share) * wide_blur(tensor, scale * tip)
     strength = np.hypot(total[..., 0], total[..., 1])
     coherence = strength / (total[..., 2] + 1e-6)
     prior = np.float32(wrist) * np.float32(np.median(total[..., 2]) + 0.02 * cap)
@@ -102,6 +127,11 @@ def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tupl
     angle = 0.5 * np.arctan2(s, c)
     trust = strength / (strength + prior + np.float32(1e-12))
     return np.dstack([np.cos(angle), np.sin(angle)]).astype(np.float32), (coherence * trust).astype(np.float32)
+
+
+def _sum(image: Floats) -> Floats:
+    """Sum over the three channels; numpy takes ten times as long over so short an axis."""
+    return np.asarray(cv2.transform(image, np.ones((1, 3), np.float32)), np.float32)
 
 
 def _scharr(image: Floats, dx: int, dy: int) -> Floats:
@@ -115,14 +145,14 @@ def calmed(linear: Floats, radius: int) -> Floats:
     Texture goes, borders stay and the half-tones along them vanish, so no grey rims are drawn.
     """
     side = radius + 1
-    brightness = linear.sum(2)
+    brightness = _sum(linear)
     quiet, out = np.full(brightness.shape, np.inf, np.float32), linear.copy()
     for anchor in ((0, 0), (radius, 0), (0, radius), (radius, radius)):
         mean, square = (cv2.boxFilter(m, cv2.CV_32F, (side, side), anchor=anchor) for m in (brightness, brightness**2))
         spread = square - mean * mean
         quieter = spread < quiet
-        quiet[quieter] = spread[quieter]
-        out[quieter] = cv2.boxFilter(linear, cv2.CV_32F, (side, side), anchor=anchor)[quieter]
+        np.copyto(quiet, spread, where=quieter)
+        cv2.copyTo(cv2.boxFilter(linear, cv2.CV_32F, (side, side), anchor=anchor), quieter.astype(np.uint8), out)
     return out
 
 
@@ -135,8 +165,8 @@ def unframed(linear: Floats) -> Floats:
 
 def detail(lab: Floats, tip: float, focus: Sequence[tuple[float, float, float, float]]) -> Floats:
     """Where a sharpened tip is worth taking: fine local contrast that rises over its surroundings."""
-    fine = np.sqrt(blur(((lab - blur(lab, 0.8 * tip)) ** 2).sum(2), 0.6 * tip))
-    around = blur(fine, 6 * tip)
+    fine = np.sqrt(blur(_sum((lab - blur(lab, 0.8 * tip)) ** 2), 0.6 * tip))
+    around = wide_blur(fine, 6 * tip)
     level = np.clip(fine / (0.03 + around) - 0.4, 0, 1.2) / 1.2 * np.clip(fine / 0.06, 0, 1)
     h, w = level.shape
     for x, y, width, height in focus:
@@ -151,29 +181,29 @@ def faces(target: Floats) -> list[Box]:
 
     A bonus: it misses many faces, so it is asked strictly and nothing depends on it.
     """
-    from skimage import data, feature
-
     h, w = target.shape[:2]
     scale = min(1.0, FACE_SIDE / max(h, w))
-    small = (
-        np.clip(fit(target, (max(1, round(h * scale)), max(1, round(w * scale)))), 0, 1) ** (1 / 2.2) * 255
-    ).astype(np.uint8)
-    if min(small.shape[:2]) < 40:
+    small = fit(target, (max(1, round(h * scale)), max(1, round(w * scale))))
+    h, w = small.shape[:2]
+    if min(h, w) < 40:
         return []
-    detector = feature.Cascade(data.lbp_frontal_face_cascade_filename())  # type: ignore[no-untyped-call]
-    side = min(small.shape[:2])
-    found = detector.detect_multi_scale(
-        img=small,
-        scale_factor=1.2,
-        step_ratio=1,
-        min_size=(side // 8, side // 8),
-        max_size=(side, side),
-        min_neighbor_number=5,
-    )
-    return [
-        (f["c"] / small.shape[1], f["r"] / small.shape[0], f["width"] / small.shape[1], f["height"] / small.shape[0])
-        for f in found
-    ]
+    grey = cv2.cvtColor((small ** (1 / 2.2) * 255).astype(np.uint8), cv2.COLOR_RGB2GRAY)
+    side = min(h, w)
+    found = _cascade().detectMultiScale(grey, 1.2, 5, minSize=(side // 8, side // 8), maxSize=(side, side))
+    return [(x / w, y / h, width / w, height / h) for x, y, width, height in found]
+
+
+def _cascade() -> Any:
+    """The detector. OpenCV reads scikit-image's file once the misspelt name of one key is put right."""
+    from skimage import data
+
+    path = data.lbp_frontal_face_cascade_filename()  # type: ignore[no-untyped-call]
+    text = Path(path).read_text("ascii")
+    text = text.replace("featuhreParams", "featureParams")
+    storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)  # has to outlive its nodes
+    detector: Any = cv2.CascadeClassifier()
+    detector.read(storage.getFirstTopLevelNode())
+    return detector
 
 
 def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:

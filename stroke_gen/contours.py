@@ -4,7 +4,10 @@ Chains of edge pixels come from OpenCV's EdgeDrawing on the lightness; they are 
 contrast and detail, and drawn as far as the style's budget of line goes.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,6 +17,7 @@ from . import hand
 from .analysis import Scene, blur
 from .colour import oklab
 from .drawing import Stroke, Tip
+from .jit import kernel
 from .params import Style
 from .separation import Plan
 from .swatches import Swatches
@@ -26,12 +30,20 @@ LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
-    """A faired chain of edge points in work cells with what speaks for drawing it."""
+class Lines:
+    """Faired chains of edge points, one after the other, with what speaks for drawing them."""
 
-    path: Floats  # (n, 2)
-    contrast: Floats  # (n,) difference of lightness between its two sides
-    worth: float
+    points: Floats  # (n, 2) in work cells
+    first: NDArray[np.int64]  # (lines + 1,) where each begins
+    contrast: Floats  # (n,) difference of lightness between the two sides
+    worth: Floats  # (lines,)
+
+    def only(self, chosen: NDArray[np.int64]) -> "Lines":
+        """Some of the lines, in the order given."""
+        length = np.diff(self.first)[chosen]
+        first = np.append(0, np.cumsum(length))
+        at = np.repeat(self.first[chosen] - first[:-1], length) + np.arange(first[-1])
+        return Lines(self.points[at], first, self.contrast[at], self.worth[chosen])
 
 
 def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
@@ -41,33 +53,27 @@ def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) ->
         return []
     tip = Tip("sharp", round(style.line_tip * style.tip_mm, 3))  # as the drawing's file rounds it
     width = tip.width_mm / scene.cell_mm
-    budget = style.lines * BUDGET * max(scene.detail.shape)
-    picked = []
-    candidates = _lines(scene, width)
+    lightness = blur(scene.lab[..., 0], max(0.3 * width, 0.7))
+    lines = _edges(scene, lightness, width)
     if style.closed:  # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
-        candidates = _areas(scene, plan.group, width) + [
-            c for c in candidates if _sample(scene.detail, c.path).mean() > 0.45
-        ]
-    for line in sorted(candidates, key=lambda line: -line.worth):
-        budget -= len(line.path)
-        if budget < 0:
-            break
-        picked.append(line)
-    chosen = [_crayon(line, scene, now, box, style) for line in picked]
-    order = sorted(range(len(picked)), key=lambda i: (-chosen[i][0], i))
+        small = _means(_sample(scene.detail, lines.points), lines.first) > 0.45
+        lines = _together(_areas(scene, plan.group, lightness, width), lines.only(np.flatnonzero(small)))
+    order = np.argsort(-lines.worth, kind="stable")
+    length = np.cumsum(np.diff(lines.first)[order])
+    lines = lines.only(order[length <= style.lines * BUDGET * max(scene.detail.shape)])
+    crayon, pressure = _crayons(lines, scene, now, box, style)
     strokes: list[Stroke] = []
-    for i in order:
-        _, crayon, pressure = chosen[i]
-        level = np.clip(picked[i].contrast / 0.25, 0.35, 1.0) * pressure
-        path = picked[i].path
-        paths = hand.Paths(path, level.astype(np.float32), np.zeros(len(path), np.int32), np.array([0, len(path)]))
-        strokes += hand.draw(paths, scene.cell_mm, crayon, tip, "line", style, rng)
+    for k in sorted(set(crayon.tolist()), key=lambda k: -box.lightness()[k]):
+        mine = np.flatnonzero(crayon == k)
+        some = lines.only(mine)
+        level = np.clip(some.contrast / 0.25, 0.35, 1.0) * np.repeat(pressure[mine], np.diff(some.first))
+        paths = hand.Paths(some.points, level.astype(np.float32), np.zeros(len(level), np.int32), some.first)
+        strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng)
     return strokes
 
 
-def _lines(scene: Scene, width: float) -> list[Line]:
-    """Candidate lines of the scene for a tip `width` cells wide."""
-    lightness = blur(scene.lab[..., 0], max(0.3 * width, 0.7))
+def _edges(scene: Scene, lightness: Floats, width: float) -> Lines:
+    """Candidate lines along the scene's edges for a tip `width` cells wide."""
     h, w = lightness.shape
     grey = cv2.resize(
         np.clip(lightness * 255, 0, 255).astype(np.uint8), (w * SCALE, h * SCALE), interpolation=cv2.INTER_CUBIC
@@ -79,86 +85,125 @@ def _lines(scene: Scene, width: float) -> list[Line]:
     settings.MinPathLength = max(8, int(3 * width * SCALE))
     detector.setParams(settings)
     detector.detectEdges(grey)
-    lines = []
-    for chain in detector.getSegments():
-        path = (np.asarray(chain, np.float32) + np.float32(0.5)) / np.float32(SCALE)
-        for part in np.array_split(path, max(1, int(len(path) / SCALE / (LONGEST * width)))):
-            line = _line(_fair(np.asarray(part, np.float32), 1.5 * SCALE), scene, lightness, width)
-            if line is not None:
-                lines.append(line)
-    return lines
+    chains: list[NDArray[Any]] = []
+    for chain in map(np.asarray, detector.getSegments()):
+        parts = int(len(chain) / SCALE / (LONGEST * width))
+        chains += np.array_split(chain, parts) if parts > 1 else [chain]
+    points, first = _end_to_end(chains)
+    fair = _faired((points + np.float32(0.5)) / np.float32(SCALE), first, 1.5 * SCALE)
+    return _lines(fair, scene, lightness, width)
 
 
-def _areas(scene: Scene, group: NDArray[np.int64], width: float) -> list[Line]:
+def _areas(scene: Scene, group: NDArray[np.int64], lightness: Floats, width: float) -> Lines:
     """Closed lines round the larger areas of one colour."""
-    lightness = blur(scene.lab[..., 0], max(0.3 * width, 0.7))
-    lines = []
-    for g in np.unique(group):
+    chains = []
+    for g in np.flatnonzero(np.bincount(group.ravel())):
         area = blur((group == g).astype(np.float32), 1.2 * width) > 0.5
         rings, _ = cv2.findContours(area.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         for ring in rings:
             path = ring[:, 0].astype(np.float32) + 0.5
-            if cv2.contourArea(path) < 20 * width * width:
-                continue
-            around = np.concatenate([path, path[: max(3, int(2 * width))]])  # the end runs a little past the beginning
-            line = _line(_fair(np.repeat(around, SCALE, 0), 1.5 * width * SCALE), scene, lightness, width, AREA_WORTH)
-            if line is not None and not _on_border(line.path, group.shape):
-                lines.append(line)
-    return lines
+            if cv2.contourArea(path) >= 20 * width * width:
+                around = np.concatenate([path, path[: max(3, int(2 * width))]])  # the end runs past the beginning
+                chains.append(np.repeat(around, SCALE, 0))
+    fair = _faired(*_end_to_end(chains), 1.5 * width * SCALE)
+    lines = _lines(fair, scene, lightness, width, AREA_WORTH)
+    x, y = lines.points.T
+    off = (x < 3) | (y < 3) | (x > group.shape[1] - 3) | (y > group.shape[0] - 3)
+    return lines.only(np.flatnonzero(_means(off.astype(np.float32), lines.first) <= 0.5))  # not the picture's border
 
 
-def _on_border(path: Floats, shape: tuple[int, ...]) -> bool:
-    """Whether most of a line runs along the picture's border."""
-    x, y = path.T
-    off = (x < 3) | (y < 3) | (x > shape[1] - 3) | (y > shape[0] - 3)
-    return bool(off.mean() > 0.5)
+def _together(one: Lines, other: Lines) -> Lines:
+    """The lines of both."""
+    first = np.append(one.first, one.first[-1] + other.first[1:])
+    both = ((getattr(one, name), getattr(other, name)) for name in ("points", "contrast", "worth"))
+    points, contrast, worth = map(np.concatenate, both)
+    return Lines(points, first, contrast, worth)
 
 
-def _fair(path: Floats, sigma: float) -> Floats:
-    """A chain smoothed along itself, its ends kept, and thinned to one point a cell or so."""
-    if len(path) < 5:
-        return path
-    radius = min(int(3 * sigma), len(path) - 1)
-    padded = np.concatenate([2 * path[:1] - path[radius:0:-1], path, 2 * path[-1:] - path[-2 : -radius - 2 : -1]])
-    weights = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    weights /= weights.sum()
-    smooth = np.stack([np.convolve(padded[:, c], weights, "valid") for c in (0, 1)], 1)
-    return smooth[::SCALE].astype(np.float32)
+def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: float = 1.0) -> Lines:
+    """Those faired chains that are long and strong enough to be lines, with their contrast and worth."""
+    fair = fair.only(np.flatnonzero(np.diff(fair.first) >= max(3.0, 2.5 * width)))
+    aside = np.float32(0.6 * width) * _normals(fair)
+    contrast = np.abs(_sample(lightness, fair.points + aside) - _sample(lightness, fair.points - aside))
+    mean = _means(contrast, fair.first)
+    detail = _means(_sample(scene.detail, fair.points), fair.first)
+    worth = factor * mean * np.diff(fair.first) ** 0.5 * (1 + 1.5 * detail)
+    return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.05))
 
 
-def _line(path: Floats, scene: Scene, lightness: Floats, width: float, factor: float = 1.0) -> Line | None:
-    """The chain as a line, if it is long and strong enough to be one."""
-    if len(path) < max(3.0, 2.5 * width):
-        return None
-    sides = [_sample(lightness, path + side * _normal(path) * 0.6 * width) for side in (1, -1)]
-    contrast = np.abs(sides[0] - sides[1])
-    mean = float(contrast.mean())
-    if mean * factor < 0.05:
-        return None
-    detail = float(_sample(scene.detail, path).mean())
-    return Line(path, contrast, factor * mean * len(path) ** 0.5 * (1 + 1.5 * detail))
+def _end_to_end(chains: Sequence[NDArray[Any]]) -> tuple[Floats, NDArray[np.int64]]:
+    """Chains one after the other (n, 2), and where each begins (chains + 1,)."""
+    first = np.cumsum([0, *map(len, chains)])
+    return np.concatenate([np.empty((0, 2)), *chains]).astype(np.float32), first
 
 
-def _normal(path: Floats) -> Floats:
-    tangent = np.gradient(path, axis=0)
-    tangent /= np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-6)[:, None]
-    return np.stack([-tangent[:, 1], tangent[:, 0]], 1).astype(np.float32)
+def _faired(points: Floats, first: NDArray[np.int64], sigma: float) -> Lines:
+    """Chains smoothed along themselves, their ends kept, and thinned to one point a cell or so."""
+    smooth, thin = np.empty_like(points), np.empty_like(first)
+    _fair(points, first, np.exp(-0.5 * (np.arange(int(3 * sigma) + 1) / sigma) ** 2), SCALE, smooth, thin)
+    smooth = smooth[: thin[-1]]
+    return Lines(smooth, thin, np.zeros(len(smooth), np.float32), np.zeros(len(thin) - 1, np.float32))
 
 
-def _sample(image: Floats, path: Floats) -> Floats:
-    """Values of a map (h, w) or (h, w, 3) along a path."""
-    j = np.clip(path[:, 1].astype(int), 0, image.shape[0] - 1)
-    i = np.clip(path[:, 0].astype(int), 0, image.shape[1] - 1)
+@kernel
+def _fair(points, first, weights, every, smooth, thin):  # type: ignore[no-untyped-def]
+    """Every `every`th point of each chain, smoothed by half a bell of `weights`: smooth (n, 2), thin (chains + 1,).
+
+    Beyond its ends a chain goes on as its mirror image about them.
+    """
+    used = 0
+    thin[0] = 0
+    for line in range(thin.size - 1):
+        begin, end = first[line], first[line + 1] - 1
+        for i in range(begin, end + 1, every):
+            total, x, y = 0.0, 0.0, 0.0
+            for o in range(-min(weights.size - 1, end - begin), min(weights.size - 1, end - begin) + 1):
+                weight, j = weights[abs(o)], i + o
+                total += weight
+                if j < begin:
+                    x += weight * (2 * points[begin, 0] - points[2 * begin - j, 0])
+                    y += weight * (2 * points[begin, 1] - points[2 * begin - j, 1])
+                elif j > end:
+                    x += weight * (2 * points[end, 0] - points[2 * end - j, 0])
+                    y += weight * (2 * points[end, 1] - points[2 * end - j, 1])
+                else:
+                    x += weight * points[j, 0]
+                    y += weight * points[j, 1]
+            smooth[used, 0], smooth[used, 1] = x / total, y / total
+            used += 1
+        thin[line + 1] = used
+
+
+def _normals(lines: Lines) -> Floats:
+    """Unit normal (n, 2) of the lines at each point."""
+    ahead, behind = np.arange(len(lines.points)) + 1, np.arange(len(lines.points)) - 1
+    ahead[lines.first[1:] - 1] -= 1
+    behind[lines.first[:-1]] += 1
+    x, y = (lines.points[ahead] - lines.points[behind]).T
+    return np.asarray(np.stack([-y, x], 1) / np.maximum(np.hypot(x, y), 1e-6)[:, None], np.float32)
+
+
+def _means(values: Floats, first: NDArray[np.int64]) -> Floats:
+    """Mean over each line of what is given for its points."""
+    count = np.diff(first).astype(np.float32)
+    total = np.add.reduceat(values, first[:-1])
+    return np.asarray(total / count.reshape(-1, *[1] * (values.ndim - 1)), np.float32)
+
+
+def _sample(image: Floats, points: Floats) -> Floats:
+    """Values of a map (h, w) or (h, w, 3) at points."""
+    j = np.clip(points[:, 1].astype(int), 0, image.shape[0] - 1)
+    i = np.clip(points[:, 0].astype(int), 0, image.shape[1] - 1)
     return image[j, i]
 
 
-def _crayon(line: Line, scene: Scene, now: Floats, box: Swatches, style: Style) -> tuple[float, str, float]:
-    """Lightness, name and pressure of the crayon that comes nearest to the line's darker side, or darker."""
-    width = style.line_tip * style.tip_mm / scene.cell_mm
-    sides = [_sample(scene.lab, line.path + side * _normal(line.path) * 0.6 * width).mean(0) for side in (1, -1)]
-    aim = min(sides, key=lambda lab: float(lab[0])) - np.array([0.15 if style.closed else 0.05, 0, 0], np.float32)
-    ground = _sample(now, line.path).mean(0)
-    colours = oklab(box.over(ground))[:, 2:]
-    off = np.linalg.norm((colours - aim) * np.array([1, 0.8, 0.8]), axis=2)
-    k, p = np.unravel_index(int(off.argmin()), off.shape)
-    return float(box.lightness()[k]), box.names[k], float(box.pressures[2 + p]) * style.line_press
+def _crayons(lines: Lines, scene: Scene, now: Floats, box: Swatches, style: Style) -> tuple[NDArray[np.int64], Floats]:
+    """For each line the crayon and pressure that come nearest to its darker side, or darker."""
+    aside = np.float32(0.6 * style.line_tip * style.tip_mm / scene.cell_mm) * _normals(lines)
+    sides = [_means(_sample(scene.lab, lines.points + side * aside), lines.first) for side in (1, -1)]
+    aim = np.where(sides[0][:, :1] <= sides[1][:, :1], *sides) - np.array([0.15 if style.closed else 0.05, 0, 0])
+    ground = _means(_sample(now, lines.points), lines.first)
+    colours = oklab(box.over(ground))[:, :, 2:]
+    off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 0.8, 0.8]), axis=3)
+    k, p = np.divmod(off.reshape(len(off), math.prod(off.shape[1:])).argmin(1), off.shape[2])
+    return k, box.pressures[2 + p] * np.float32(style.line_press)

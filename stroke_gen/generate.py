@@ -1,12 +1,14 @@
 """The conductor: photo to strokes. It lists the stages and holds no mathematics of its own."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import analysis, contours, hand, hatching, recipes, separation
+from .analysis import Scene
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .params import Pass, Style
@@ -32,25 +34,32 @@ def generate(
     light on a grid of `shape`: the generator steps back and looks before each coat.
     """
     rng = np.random.default_rng([seed, 3])
-    scene = analysis.read(photo, width_mm, height_mm, swatches, style, focus)
-    mixes = recipes.find(oklab(scene.calm), swatches, style.recipes, style.crayons, rng)
+    strokes: list[Stroke] = []
+    with ThreadPoolExecutor(threads) as pool:
+        scene = analysis.read(photo, width_mm, height_mm, swatches, style, focus, pool)
+        plan = _plan(scene, swatches, style, rng, pool)
+        boldest = float(np.percentile(np.linalg.norm(scene.lab - oklab(swatches.paper), axis=2), 95))
+        stages = [lambda now, coat=coat: _coat(plan, now, _finer(coat, boldest), style, rng) for coat in style.passes]
+        lines = [lambda now: contours.outlines(plan, now, style, rng)]
+        now = observe([], plan.group.shape)
+        for stage in lines * style.lines_first + stages + lines:
+            fresh = hand.within(stage(now), width_mm, height_mm)
+            strokes += fresh
+            now = observe(fresh, plan.group.shape)
+    return strokes
+
+
+def _plan(scene: Scene, swatches: Swatches, style: Style, rng: np.random.Generator, pool: Executor) -> Plan:
+    """Take crayons out of the box, and part the scene into areas with a recipe and directions of their own."""
+    calm = oklab(scene.calm)
+    mixes = recipes.find(calm, swatches, style.recipes, style.crayons, rng)
     swatches, mixes = swatches.only(mixes.crayons()), mixes.alone()
     tip = style.tip_mm / scene.cell_mm
     ragged = RAGGED * separation.streaks(scene.detail.shape, tip, style.wrist_deg, rng)
-    group = separation.grouped(oklab(scene.calm), mixes, AGREE * tip, ragged)
+    group = separation.grouped(calm, mixes, AGREE * tip, ragged, pool)
     fan = style.fan_deg * rng.standard_normal(len(mixes.base)).astype(np.float32)
     scene = replace(scene, tangent=analysis.turned(scene.tangent, fan[group]))
-    plan = Plan(scene, swatches, mixes, group, threads)
-    boldest = float(np.percentile(np.linalg.norm(scene.lab - oklab(swatches.paper), axis=2), 95))
-    stages = [lambda now, coat=coat: _coat(plan, now, _finer(coat, boldest), style, rng) for coat in style.passes]
-    lines = [lambda now: contours.outlines(plan, now, style, rng)]
-    strokes: list[Stroke] = []
-    now = observe([], group.shape)
-    for stage in lines * style.lines_first + stages + lines:
-        fresh = hand.within(stage(now), width_mm, height_mm)
-        strokes += fresh
-        now = observe(fresh, group.shape)
-    return strokes
+    return Plan(scene, swatches, mixes, group, pool)
 
 
 def _finer(coat: Pass, boldest: float) -> Pass:
@@ -64,18 +73,23 @@ def _coat(plan: Plan, now: Floats, coat: Pass, style: Style, rng: np.random.Gene
     width = round(coat.tip * style.tip_mm, 3)  # as the drawing's file rounds it
     tip = Tip("sharp" if coat.sharp else "blunt", width)
     cells = width / scene.cell_mm
+    sheet = plan.pool.submit(lambda: analysis.blur(now, 0.5 * cells))
+    tangent = plan.pool.submit(lambda: analysis.turned(scene.tangent, np.float32(coat.angle)))
+    astray = plan.pool.submit(lambda: scene.afar - analysis.far(now)) if coat.kind == "free" else None
     seen = scene.target if coat.detail > 0 else scene.calm
     aim = oklab(analysis.blur(seen, coat.soften * 0.5 * cells))
-    if coat.kind == "free":
-        aim = aim + np.float32(FAR_SIGHT) * (analysis.far(scene.target) - analysis.far(now))
     streak = separation.streaks(plan.group.shape, cells, style.wrist_deg, rng)
-    wants = separation.plates(plan, analysis.blur(now, 0.5 * cells), aim, coat, cells, style.flat, streak)
-    tangent = analysis.turned(scene.tangent, np.float32(coat.angle))
+    if astray:
+        aim += np.float32(FAR_SIGHT) * astray.result()
+    wants = separation.plates(plan, sheet.result(), aim, coat, cells, style.flat, streak)
     how = hatching.Hatch(
         coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single
     )
-    strokes: list[Stroke] = []
-    for k in sorted(wants, key=lambda k: -box.lightness()[k]):
-        paths = hatching.hatch(wants[k], tangent, scene.coherence, how, rng)
-        strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, coat.name, style, rng)
-    return strokes
+    rngs = rng.spawn(len(box.names))
+
+    def drawn(k: int) -> list[Stroke]:
+        paths = hatching.hatch(wants[k], tangent.result(), scene.coherence, how, rngs[k])
+        return hand.draw(paths, scene.cell_mm, box.names[k], tip, coat.name, style, rngs[k])
+
+    order = sorted(wants, key=lambda k: -box.lightness()[k])
+    return [stroke for strokes in plan.pool.map(drawn, order) for stroke in strokes]

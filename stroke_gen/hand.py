@@ -59,10 +59,13 @@ def within(strokes: list[Stroke], width_mm: float, height_mm: float) -> list[Str
     """
     size = np.array([width_mm, height_mm])
     low, high = np.round(-size, 3).astype(np.float32), np.round(2 * size, 3).astype(np.float32)
-    return [
-        s if ((low <= s.path_mm) & (s.path_mm <= high)).all() else replace(s, path_mm=s.path_mm.clip(low, high))
-        for s in strokes
-    ]
+    if not strokes or _all_within(np.concatenate([s.path_mm for s in strokes]), low, high):
+        return strokes
+    return [s if _all_within(s.path_mm, low, high) else replace(s, path_mm=s.path_mm.clip(low, high)) for s in strokes]
+
+
+def _all_within(points: Floats, low: Floats, high: Floats) -> bool:
+    return bool(((low <= points) & (points <= high)).all())
 
 
 def _overshoot(

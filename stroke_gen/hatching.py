@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .hand import Paths
-from .jit import kernel
+from .jit import kernel, lean_kernel
 
 Floats = NDArray[np.float32]
 FINE = 2  # cells of the stamp map per work cell
 STEP = 0.6  # work cells between points of a path
+TILE = 64  # grid cells, a power of two, after which the jitter of the seeds repeats itself
 
 
 @dataclass(frozen=True)
@@ -31,13 +32,13 @@ class Hatch:
     single: float  # coherence from which legs are drawn singly, as hair is
 
 
-@kernel
+@lean_kernel
 def _free(stamp, x, y, fine, below):  # type: ignore[no-untyped-def]
     j, i = int(y * fine), int(x * fine)
     return 0 <= j < stamp.shape[0] and 0 <= i < stamp.shape[1] and stamp[j, i] < below
 
 
-@kernel
+@lean_kernel
 def _leg(x, y, dx, dy, want, tangent, stamp, fine, step, reach, gap, sharpest, out):  # type: ignore[no-untyped-def]
     """Follow the field from (x, y) towards (dx, dy); points into out (n, 2), returns how many."""
     h, w = want.shape
@@ -68,23 +69,24 @@ def _leg(x, y, dx, dy, want, tangent, stamp, fine, step, reach, gap, sharpest, o
     return last
 
 
-@kernel
+@lean_kernel
 def _press(stamp, path, n, spacing, fine):  # type: ignore[no-untyped-def]
     """Stamp discs along a path: 2 where no other line may come, 1 where none may begin.
 
     Without the second, lines would be squeezed in half-way between two that lie just right.
     """
-    inner, outer = spacing * fine * np.float32(0.46), spacing * fine * np.float32(0.75)
-    k = int(outer) + 1
+    inner, outer = spacing * fine * 0.46, spacing * fine * 0.75
+    h, w = stamp.shape
     for p in range(n):
-        cx, cy = path[p, 0] * fine, path[p, 1] * fine
-        for j in range(max(0, int(cy) - k), min(stamp.shape[0], int(cy) + k + 1)):
-            for i in range(max(0, int(cx) - k), min(stamp.shape[1], int(cx) + k + 1)):
-                apart = (i + np.float32(0.5) - cx) ** 2 + (j + np.float32(0.5) - cy) ** 2
-                if apart <= inner * inner:
-                    stamp[j, i] = 2
-                elif apart <= outer * outer and stamp[j, i] == 0:
-                    stamp[j, i] = 1
+        cx, cy = path[p, 0] * fine - 0.5, path[p, 1] * fine - 0.5
+        for j in range(max(0, int(np.ceil(cy - outer))), min(h, int(np.floor(cy + outer)) + 1)):
+            half = np.sqrt(outer * outer - (j - cy) ** 2)
+            for i in range(max(0, int(np.ceil(cx - half))), min(w, int(np.floor(cx + half)) + 1)):
+                stamp[j, i] = max(stamp[j, i], 1)
+        for j in range(max(0, int(np.ceil(cy - inner))), min(h, int(np.floor(cy + inner)) + 1)):
+            half = np.sqrt(inner * inner - (j - cy) ** 2)
+            for i in range(max(0, int(np.ceil(cx - half))), min(w, int(np.floor(cx + half)) + 1)):
+                stamp[j, i] = 2
 
 
 @kernel
@@ -186,19 +188,30 @@ def _carried_over(pressure: Floats) -> Floats:
     return pressure[before]
 
 
+@lean_kernel
+def _sow(want, left, top, rows, cols, pitch, jitter, block, seeds, rank):  # type: ignore[no-untyped-def]
+    """Seeds (n, 2) on a jittered grid where they are wanted, and the rank (n,) of the region each lies in."""
+    h, w = want.shape
+    most = jitter.shape[1] - 1
+    number = 0
+    for i in range(rows):
+        for j in range(cols):
+            x = min(left + (j + jitter[0, i & most, j & most]) * pitch, w - 1e-3)
+            y = min(top + (i + jitter[1, i & most, j & most]) * pitch, h - 1e-3)
+            if want[int(y), int(x)] > 0:
+                row, col = y // block, x // block
+                seeds[number, 0], seeds[number, 1] = x, y
+                rank[number] = 2 * w * row + (col if row % 2 == 0 else -col)  # to and fro
+                number += 1
+    return number
+
+
 def _seeds(want: Floats, how: Hatch, rng: np.random.Generator) -> Floats:
     """Places to begin, one to a spacing, region by region as a hand moves over the sheet."""
-    h, w = want.shape
     pitch = max(how.spacing * 0.7, 1.0)
     left, top, width, height = cv2.boundingRect((want > 0).astype(np.uint8))
-    y, x = np.mgrid[top : top + height : pitch, left : left + width : pitch].reshape(2, -1)
-    jitter = rng.random((2, x.size), np.float32) * pitch
-    x, y = np.minimum(x + jitter[0], w - 1e-3), np.minimum(y + jitter[1], h - 1e-3)
-    wanted = want[y.astype(int), x.astype(int)] > 0
-    x, y = x[wanted], y[wanted]
-    block = max(how.reach, 8.0)
-    row = (y // block).astype(int)
-    col = (x // block).astype(int)
-    col = np.where(row % 2 == 0, col, -col)  # to and fro
-    order = np.lexsort((rng.random(x.size), col, row))
-    return np.stack([x, y], 1)[order].astype(np.float32)
+    rows, cols = int(np.ceil(height / pitch)), int(np.ceil(width / pitch))
+    jitter = rng.random((2, TILE, TILE), np.float32)
+    seeds, rank = np.empty((rows * cols, 2), np.float32), np.empty(rows * cols)
+    number = _sow(want, left, top, rows, cols, pitch, jitter, max(how.reach, 8.0), seeds, rank)
+    return seeds[np.argsort(rank[:number] + rng.random(number))]

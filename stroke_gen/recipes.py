@@ -50,8 +50,9 @@ _cube_root = kernel(cube_root)
 
 @kernel
 def _costs(sample, a, b, grain, paper, heavy, pairs, extra, to_lms, to_lab, grain_price, cost):  # type: ignore[no-untyped-def]
-    """Mean over samples (groups, n, 3) of the least cost over both pressures of each pair: cost (groups, pairs)."""
-    groups, n = sample.shape[:2]
+    """Mean over samples (groups, 3, n) of the least cost over both pressures of each pair: cost (groups, pairs)."""
+    groups, _, n = sample.shape
+    least = np.empty(n, np.float32)
     pressures = grain.shape[1]
     colour, price = np.empty((pressures * pressures, 3), np.float32), np.empty(pressures * pressures, np.float32)
     for q in range(pairs.shape[0]):
@@ -81,18 +82,13 @@ def _costs(sample, a, b, grain, paper, heavy, pairs, extra, to_lms, to_lab, grai
                 price[number] = grain_price * dots + extra[q]
                 number += 1
         for g in range(groups):
-            total = np.float32(0)
-            for i in range(n):
-                least = np.float32(9)
-                for m in range(number):
-                    dl, da, db = (
-                        colour[m, 0] - sample[g, i, 0],
-                        colour[m, 1] - sample[g, i, 1],
-                        colour[m, 2] - sample[g, i, 2],
-                    )
-                    least = min(least, np.sqrt(dl * dl + da * da + db * db) + price[m])
-                total += least
-            cost[g, q] = total / n
+            least[:] = 9
+            for m in range(number):
+                lightness, red, yellow, dear = colour[m, 0], colour[m, 1], colour[m, 2], price[m]
+                for i in range(n):
+                    dl, da, db = lightness - sample[g, 0, i], red - sample[g, 1, i], yellow - sample[g, 2, i]
+                    least[i] = min(least[i], np.sqrt(dl * dl + da * da + db * db) + dear)
+            cost[g, q] = least.mean()
 
 
 def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random.Generator) -> Recipes:
@@ -102,7 +98,8 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
     weighted = flat * np.array([TONE, 1, 1], np.float32)
     centres, label = _group(weighted, groups, rng)
     size = np.bincount(label, minlength=len(centres)).astype(np.float64)
-    sample = np.stack([flat[rng.choice(np.flatnonzero(label == g), SAMPLES)] for g in range(len(centres))])
+    chosen = np.stack([rng.choice(np.flatnonzero(label == g), SAMPLES) for g in range(len(centres))])
+    sample = np.ascontiguousarray(flat[chosen].swapaxes(1, 2))
     light = swatches.lightness()
     count = len(swatches.names)
     pairs = np.array([(i, j) for i in range(count) for j in range(count) if i == j or light[i] > light[j]], np.int64)
@@ -122,10 +119,9 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
 
 def clash(one: Floats, other: Floats) -> Floats:
     """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are alike."""
-    dot = (one * other).sum(-1)
-    return np.asarray(
-        np.sqrt(np.maximum(np.hypot(one[..., 0], one[..., 1]) * np.hypot(other[..., 0], other[..., 1]) - dot, 0))
-    )
+    dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
+    squares = (one[..., 0] ** 2 + one[..., 1] ** 2) * (other[..., 0] ** 2 + other[..., 1] ** 2)
+    return np.asarray(np.sqrt(np.maximum(np.sqrt(squares) - dot, 0)))
 
 
 def _group(colours: Floats, groups: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
@@ -139,22 +135,33 @@ def _group(colours: Floats, groups: int, rng: np.random.Generator) -> tuple[Floa
         centres = np.vstack([centres, colours[rng.choice(len(colours), p=distance / distance.sum())]])
     label = nearest(colours, centres)
     for _ in range(12):
-        kept = [colours[label == g].mean(0) for g in range(len(centres)) if (label == g).any()]
-        centres = np.array(kept, np.float32)
+        count = np.bincount(label)
+        total = np.stack([np.bincount(label, channel) for channel in colours.T], 1)
+        centres = (total[count > 0] / count[count > 0, None]).astype(np.float32)
         label = nearest(colours, centres)
     kept_groups = np.unique(label)
     return centres[kept_groups], np.searchsorted(kept_groups, label)
 
 
+@kernel
+def _nearest(colours, centres, best, label):  # type: ignore[no-untyped-def]
+    """Centre by centre: label (n,) where its squared distance undercuts `best` (n,)."""
+    for g in range(centres.shape[0]):
+        c0, c1, c2 = centres[g]
+        for i in range(label.size):
+            d0, d1, d2 = colours[0, i] - c0, colours[1, i] - c1, colours[2, i] - c2
+            distance = d0 * d0 + d1 * d1 + d2 * d2
+            closer = distance < best[i]
+            best[i] = distance if closer else best[i]
+            label[i] = g if closer else label[i]
+
+
 def nearest(colours: Floats, centres: Floats) -> NDArray[np.int64]:
     """Index of the nearest centre for colours (..., 3)."""
-    best = np.full(colours.shape[:-1], np.inf, np.float32)
-    label = np.zeros(colours.shape[:-1], np.int64)
-    for g, centre in enumerate(centres):
-        distance = ((colours - centre) ** 2).sum(-1)
-        closer = distance < best
-        best[closer], label[closer] = distance[closer], g
-    return label
+    columns = np.ascontiguousarray(colours.reshape(-1, 3).T, np.float32)
+    label = np.zeros(columns.shape[1], np.int64)
+    _nearest(columns, centres.astype(np.float32), np.full(label.shape, np.inf, np.float32), label)
+    return label.reshape(colours.shape[:-1])
 
 
 def _box(
@@ -183,12 +190,12 @@ def _agree(cost: Floats, pairs: NDArray[np.int64], centres: Floats) -> NDArray[n
     gap = ((centres[:, None] - centres[None]) ** 2).sum(2)
     near = np.exp(-gap / (2 * LIKE**2)) * (1 - np.eye(len(centres)))
     near /= np.maximum(near.sum(1, keepdims=True), 1.0)
+    shared = [np.isin(pairs, pairs[q]).mean(1) for q in best]  # how much of each pair every group's own pair has
     for _ in range(4):
         for g in range(len(centres)):
-            shared = [
-                np.isin(pairs, pairs[best[o]]).mean(1) * near[g, o] for o in range(len(centres)) if near[g, o] > 0.02
-            ]
-            best[g] = int((cost[g] - AGREEMENT * sum(shared, np.zeros(len(pairs)))).argmin())
+            like = sum((shared[o] * near[g, o] for o in np.flatnonzero(near[g] > 0.02)), np.zeros(len(pairs)))
+            best[g] = int((cost[g] - AGREEMENT * like).argmin())
+            shared[g] = np.isin(pairs, pairs[best[g]]).mean(1)
     return best
 
 

@@ -5,7 +5,7 @@ price for grain (feather-light black on a light wall is pepper) and for going da
 which no crayon undoes.
 """
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import cv2
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .analysis import Scene, blur
 from .colour import TO_LAB, TO_LMS, cube_root, oklab
-from .jit import kernel
+from .jit import kernel, lean_kernel
 from .params import Pass
 from .recipes import CLASH_PRICE, GRAIN_PRICE, TONE, Recipes, clash, nearest
 from .swatches import Swatches
@@ -35,115 +35,138 @@ class Plan:
     swatches: Swatches
     recipes: Recipes
     group: NDArray[np.int64]  # (h, w) recipe of each place
-    threads: int
+    pool: Executor  # over whose threads work is spread
 
 
 _cube_root = kernel(cube_root)
 
 
+@lean_kernel
+def _off(light, lab, a, b, to_lms, to_lab, tone, dark_price, price, off):  # type: ignore[no-untyped-def]
+    """What is off (n,) where the lights (3, n) have become a * light + b, against lab (3, n).
+
+    Colours lie in columns and all else in plain variables, so that the compiler can use vectors.
+    """
+    a0, a1, a2 = a[0], a[1], a[2]
+    b0, b1, b2 = b[0], b[1], b[2]
+    l0, l1, l2 = to_lms[0, 0], to_lms[0, 1], to_lms[0, 2]
+    m0, m1, m2 = to_lms[1, 0], to_lms[1, 1], to_lms[1, 2]
+    s0, s1, s2 = to_lms[2, 0], to_lms[2, 1], to_lms[2, 2]
+    t0, t1, t2 = to_lab[0, 0], to_lab[0, 1], to_lab[0, 2]
+    u0, u1, u2 = to_lab[1, 0], to_lab[1, 1], to_lab[1, 2]
+    v0, v1, v2 = to_lab[2, 0], to_lab[2, 1], to_lab[2, 2]
+    for i in range(off.size):
+        red, green, blue = a0 * light[0, i] + b0, a1 * light[1, i] + b1, a2 * light[2, i] + b2
+        long = _cube_root(l0 * red + l1 * green + l2 * blue)
+        medium = _cube_root(m0 * red + m1 * green + m2 * blue)
+        short = _cube_root(s0 * red + s1 * green + s2 * blue)
+        lighter = t0 * long + t1 * medium + t2 * short - lab[0, i]
+        redder = u0 * long + u1 * medium + u2 * short - lab[1, i]
+        yellower = v0 * long + v1 * medium + v2 * short - lab[2, i]
+        error = np.sqrt(tone * lighter * lighter + redder * redder + yellower * yellower)
+        off[i] = error + (dark_price * max(np.float32(0), -lighter) + price)
+
+
 @kernel
-def _gain(  # type: ignore[no-untyped-def]
-    top, bottom, current, lab, need, pressures, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best
-):
-    """Best gain and pressure index of the needed crayons on rows top..bottom: gain, best (k, h, w)."""
-    crayons = grain.shape[0]
-    for y in range(top, bottom):
-        for x in range(current.shape[1]):
-            r, g, b0 = current[y, x, 0], current[y, x, 1], current[y, x, 2]
-            now = np.float32(0)
-            for k in range(-1, crayons):
-                if k >= 0 and not (need[y, x] >> np.uint64(k)) & np.uint64(1):
-                    continue
-                top_gain, top_p = np.float32(-9), 0
-                for p in range(pressures if k >= 0 else 1):
-                    if k >= 0:
-                        r1, g1, b1 = (
-                            a[k, p, 0] * r + b[k, p, 0],
-                            a[k, p, 1] * g + b[k, p, 1],
-                            a[k, p, 2] * b0 + b[k, p, 2],
-                        )
-                    else:
-                        r1, g1, b1 = r, g, b0
-                    l0 = _cube_root(to_lms[0, 0] * r1 + to_lms[0, 1] * g1 + to_lms[0, 2] * b1)
-                    m0 = _cube_root(to_lms[1, 0] * r1 + to_lms[1, 1] * g1 + to_lms[1, 2] * b1)
-                    s0 = _cube_root(to_lms[2, 0] * r1 + to_lms[2, 1] * g1 + to_lms[2, 2] * b1)
-                    dl = to_lab[0, 0] * l0 + to_lab[0, 1] * m0 + to_lab[0, 2] * s0 - lab[y, x, 0]
-                    da = to_lab[1, 0] * l0 + to_lab[1, 1] * m0 + to_lab[1, 2] * s0 - lab[y, x, 1]
-                    db = to_lab[2, 0] * l0 + to_lab[2, 1] * m0 + to_lab[2, 2] * s0 - lab[y, x, 2]
-                    error = np.sqrt(tone * dl * dl + da * da + db * db)
-                    if k < 0:
-                        now = error
-                        continue
-                    error += dark_price * max(np.float32(0), -dl) + grain_price * grain[k, p]
-                    if now - error > top_gain:
-                        top_gain, top_p = now - error, p
-                if k >= 0:
-                    gain[k, y, x] = top_gain
-                    best[k, y, x] = top_p
+def _gain(top, left, current, lab, need, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best):  # type: ignore[no-untyped-def]
+    """Gain and pressure index (h, w) of a crayon in a window whose corner is (top, left), where `need` (h, w) is set.
+
+    a, b and grain have a row for each pressure.
+    """
+    number = np.count_nonzero(need)
+    light, target = np.empty((3, number), np.float32), np.empty((3, number), np.float32)
+    i = 0
+    for y in range(need.shape[0]):
+        for x in range(need.shape[1]):
+            if need[y, x]:
+                for c in range(3):
+                    light[c, i], target[c, i] = current[top + y, left + x, c], lab[top + y, left + x, c]
+                i += 1
+    now, off = np.empty(number, np.float32), np.empty(number, np.float32)
+    most, which = np.full(number, np.float32(-9)), np.zeros(number, np.int8)
+    same, nothing, zero = np.ones(3, np.float32), np.zeros(3, np.float32), np.float32(0)
+    _off(light, target, same, nothing, to_lms, to_lab, tone, zero, zero, now)
+    for p in range(grain.size):
+        _off(light, target, a[p], b[p], to_lms, to_lab, tone, dark_price, grain_price * grain[p], off)
+        for i in range(number):
+            better = now[i] - off[i] > most[i]
+            most[i] = now[i] - off[i] if better else most[i]
+            which[i] = p if better else which[i]
+    i = 0
+    for y in range(need.shape[0]):
+        for x in range(need.shape[1]):
+            if need[y, x]:
+                gain[y, x], best[y, x] = most[i], which[i]
+                i += 1
 
 
 def gains(
-    current: Floats, lab: Floats, swatches: Swatches, need: NDArray[np.uint64], coat: Pass, threads: int
-) -> tuple[Floats, NDArray[np.int8]]:
-    """Gain (k, h, w) of each needed crayon at its best pressure, and that pressure's index (k, h, w).
+    current: Floats, lab: Floats, corner: tuple[int, int], need: NDArray[np.uint8],
+    swatches: Swatches, k: int, coat: Pass,
+) -> tuple[Floats, NDArray[np.int8]]:  # fmt: skip
+    """Gain of crayon k at its best pressure, and that pressure's index, in a window where it is needed.
 
-    current: linear colours on the sheet now (h, w, 3); lab: the target in OKLab (h, w, 3); need (h, w): a bit
-    for each crayon in question. A crayon that is not has the gain UNASKED.
+    current: linear colours on the sheet now (h, w, 3); lab: the target in OKLab (h, w, 3); corner: row and column
+    of the window's; need: the window, not 0 where the crayon is in question. Elsewhere its gain is UNASKED.
     """
-    h, w = current.shape[:2]
     pressures = max(1, int((swatches.pressures <= coat.hardest).sum()))
-    gain = np.full((len(swatches.names), h, w), UNASKED, np.float32)
-    best = np.zeros(gain.shape, np.int8)
+    gain, best = np.full(need.shape, UNASKED, np.float32), np.zeros(need.shape, np.int8)
     weights = np.float32(coat.tone), np.float32(coat.dark_price), np.float32(GRAIN_PRICE)
-
-    def band(top: int) -> None:
-        _gain(top, min(h, top + BAND), current, lab, need, pressures, swatches.a, swatches.b, swatches.grain,
-              TO_LMS, TO_LAB, *weights, gain, best)  # fmt: skip
-
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(band, range(0, h, BAND)))
+    table = (m[k, :pressures] for m in (swatches.a, swatches.b, swatches.grain))
+    _gain(*corner, current, lab, need, *table, TO_LMS, TO_LAB, *weights, gain, best)
     return gain, best
 
 
 @kernel
-def _base(top, bottom, lab, group, base, shade, paper, a, b, grain, log_p, to_lms, to_lab, grain_price, sharp, out):  # type: ignore[no-untyped-def]
-    """Softly chosen pressure of the base coat for each cell, looking ahead to the shade over it."""
-    pressures = log_p.size
+def _mixed(base, shade, paper, a, b, grain, to_lms, to_lab, grain_price, colour, price):  # type: ignore[no-untyped-def]
+    """OKLab (3, choices) and price of one crayon at every pressure, bare and with the other over it.
+
+    Choices are in the order of the base's pressure; returns how many there are.
+    """
+    pressures = grain.shape[1]
     light = np.empty(3, np.float32)
-    cost = np.empty(pressures * (pressures + 1), np.float32)
+    number = 0
+    for p1 in range(pressures):
+        for p2 in range(-1, pressures if base != shade else 0):  # -1: no shade
+            dots = grain[base, p1]
+            for c in range(3):
+                light[c] = a[base, p1, c] * paper[c] + b[base, p1, c]
+            if p2 >= 0:
+                through = (a[shade, p2, 0] + a[shade, p2, 1] + a[shade, p2, 2]) / 3
+                dots = dots * through + np.float32(0.7) * grain[shade, p2]
+                for c in range(3):
+                    light[c] = a[shade, p2, c] * light[c] + b[shade, p2, c]
+            l0 = _cube_root(to_lms[0, 0] * light[0] + to_lms[0, 1] * light[1] + to_lms[0, 2] * light[2])
+            m0 = _cube_root(to_lms[1, 0] * light[0] + to_lms[1, 1] * light[1] + to_lms[1, 2] * light[2])
+            s0 = _cube_root(to_lms[2, 0] * light[0] + to_lms[2, 1] * light[1] + to_lms[2, 2] * light[2])
+            for c in range(3):
+                colour[c, number] = to_lab[c, 0] * l0 + to_lab[c, 1] * m0 + to_lab[c, 2] * s0
+            price[number] = grain_price * dots
+            number += 1
+    return number
+
+
+@kernel
+def _base(top, bottom, lab, group, colour, price, choices, log_p, sharp, out):  # type: ignore[no-untyped-def]
+    """Softly chosen pressure of the base coat for each cell, by what its recipe's choices give."""
+    cost = np.empty(price.shape[1], np.float32)
     for y in range(top, bottom):
         for x in range(lab.shape[1]):
-            k1, k2 = base[group[y, x]], shade[group[y, x]]
-            number = 0
-            for p1 in range(pressures):
-                for p2 in range(-1, pressures if k1 != k2 else 0):  # -1: no shade
-                    price = grain[k1, p1]
-                    for c in range(3):
-                        light[c] = a[k1, p1, c] * paper[c] + b[k1, p1, c]
-                    if p2 >= 0:
-                        price = (
-                            price * (a[k2, p2, 0] + a[k2, p2, 1] + a[k2, p2, 2]) / 3 + np.float32(0.7) * grain[k2, p2]
-                        )
-                        for c in range(3):
-                            light[c] = a[k2, p2, c] * light[c] + b[k2, p2, c]
-                    l0 = _cube_root(to_lms[0, 0] * light[0] + to_lms[0, 1] * light[1] + to_lms[0, 2] * light[2])
-                    m0 = _cube_root(to_lms[1, 0] * light[0] + to_lms[1, 1] * light[1] + to_lms[1, 2] * light[2])
-                    s0 = _cube_root(to_lms[2, 0] * light[0] + to_lms[2, 1] * light[1] + to_lms[2, 2] * light[2])
-                    error = np.float32(0)
-                    for c in range(3):
-                        d = to_lab[c, 0] * l0 + to_lab[c, 1] * m0 + to_lab[c, 2] * s0 - lab[y, x, c]
-                        error += d * d
-                    cost[number] = np.sqrt(error) + grain_price * price
-                    number += 1
-            least = cost[0]
-            for m in range(1, number):
-                least = min(least, cost[m])
-            each = number // pressures
+            g = group[y, x]
+            number = choices[g]
+            l0, a0, b0 = lab[y, x]
+            for m in range(number):
+                dl, da, db = colour[g, 0, m] - l0, colour[g, 1, m] - a0, colour[g, 2, m] - b0
+                cost[m] = np.sqrt(dl * dl + da * da + db * db) + price[g, m]
+            least = cost[:number].min()
+            each = number // log_p.size
             total, mean = np.float32(0), np.float32(0)
             for m in range(number):
-                weight = np.exp((least - cost[m]) * sharp)
-                total += weight
-                mean += weight * log_p[m // each]
+                worse = (cost[m] - least) * sharp
+                if worse < 16:  # beyond, no digit of the mean would change
+                    weight = np.exp(-worse)
+                    total += weight
+                    mean += weight * log_p[m // each]
             out[y, x] = np.exp(mean / total)
 
 
@@ -152,17 +175,19 @@ def base_pressure(plan: Plan, lab: Floats) -> Floats:
 
     Choices of nearly equal worth are averaged, so pressure follows tone without steps.
     """
-    out = np.empty(lab.shape[:2], np.float32)
     recipes, swatches = plan.recipes, plan.swatches
-    log_p = np.log(swatches.pressures)
+    groups, pressures = len(recipes.base), len(swatches.pressures)
+    colour = np.empty((groups, 3, pressures * (pressures + 1)), np.float32)
+    price, choices = np.empty(colour[:, 0].shape, np.float32), np.empty(groups, np.int64)
+    for g in range(groups):
+        choices[g] = _mixed(recipes.base[g], recipes.shade[g], swatches.paper, swatches.a, swatches.b, swatches.grain,
+                            TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), colour[g], price[g])  # fmt: skip
+    out, log_p = np.empty(lab.shape[:2], np.float32), np.log(swatches.pressures)
 
     def band(top: int) -> None:
-        _base(top, min(len(out), top + BAND), lab, plan.group, recipes.base, recipes.shade, swatches.paper,
-              swatches.a, swatches.b, swatches.grain, log_p, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), SHARP,
-              out)  # fmt: skip
+        _base(top, min(len(out), top + BAND), lab, plan.group, colour, price, choices, log_p, SHARP, out)
 
-    with ThreadPoolExecutor(plan.threads) as pool:
-        list(pool.map(band, range(0, len(out), BAND)))
+    list(plan.pool.map(band, range(0, len(out), BAND)))
     return out
 
 
@@ -174,30 +199,48 @@ def plates(
     The recipe says which crayon a base or shade coat takes; a free coat takes the one of most worth. A line
     goes on while the tip as a whole gains.
     """
-    swatches, recipes, group = plan.swatches, plan.recipes, plan.group
-    if coat.kind == "base":
-        chosen = np.where(streak > RIVAL_SHARE, recipes.rival[group], recipes.base[group])
-    elif coat.kind == "shade":
-        chosen = recipes.shade[group]
-    else:
-        chosen = _worthiest(plan, current, aim, coat, cells)
-    reach = 2 * int(np.ceil(2 * coat.edge * cells)) + 1
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-    need = np.zeros(chosen.shape, np.uint64)
-    for k in np.unique(chosen):
-        need |= cv2.dilate((chosen == k).astype(np.uint8), disc).astype(np.uint64) << np.uint64(k)
-    gain, best = gains(current, aim, swatches, need, coat, plan.threads)
+    swatches, group = plan.swatches, plan.group
+    chosen = _chosen(plan, current, aim, coat, cells, streak)
+    careful = (plan.scene.detail >= coat.detail).astype(np.uint8)
     steps = np.log(swatches.pressures)
     level = np.log(np.minimum(base_pressure(plan, aim), coat.hardest)) if coat.kind == "base" else None
-    wants = {}
-    for k in np.unique(chosen):
-        here = (chosen == k) & (plan.scene.detail >= coat.detail) & (blur(gain[k], coat.edge * cells) > coat.gain)
-        if here.any():
-            log_p = blur(steps[best[k]] if level is None else level, 0.3 * cells)
-            if flat > 0:
-                log_p = (1 - flat) * log_p + flat * _group_means(log_p, group, here)
-            wants[int(k)] = np.where(here, np.exp(log_p), 0).astype(np.float32)
-    return wants
+    reach = int(np.ceil(2 * coat.edge * cells))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    margin = reach + int(4 * max(coat.edge, 0.3) * cells) + 2  # as far as blurs reach
+
+    def plate(k: int) -> Floats | None:
+        """One crayon's plate, worked out in the window in which it has been chosen."""
+        mine = (chosen == k).astype(np.uint8)
+        window = _around(mine & careful, margin)
+        near = np.asarray(cv2.dilate(mine[window], disc), np.uint8)
+        gain, best = gains(current, aim, (window[0].start, window[1].start), near, swatches, k, coat)
+        here = (mine & careful)[window].astype(bool) & (blur(gain, coat.edge * cells) > coat.gain)
+        if not here.any():
+            return None
+        log_p = blur(steps[best] if level is None else level[window], 0.3 * cells)
+        if flat > 0:
+            log_p = (1 - flat) * log_p + flat * _group_means(log_p, group[window], here)
+        want = np.zeros(mine.shape, np.float32)
+        want[window] = np.where(here, np.exp(log_p), 0)
+        return want
+
+    crayons = np.flatnonzero(np.bincount(chosen[careful > 0])).tolist()
+    return {k: want for k, want in zip(crayons, plan.pool.map(plate, crayons), strict=True) if want is not None}
+
+
+def _chosen(plan: Plan, current: Floats, aim: Floats, coat: Pass, cells: float, streak: Floats) -> NDArray[np.uint8]:
+    """The crayon (h, w) that a coat takes in each place."""
+    recipes = plan.recipes
+    base, shade, rival = (m.astype(np.uint8)[plan.group] for m in (recipes.base, recipes.shade, recipes.rival))
+    if coat.kind == "base":
+        return np.where(streak > RIVAL_SHARE, rival, base)
+    return shade if coat.kind == "shade" else _worthiest(plan, current, aim, coat, cells)
+
+
+def _around(mask: NDArray[np.uint8], margin: int) -> tuple[slice, slice]:
+    """Rows and columns of the window round all that is marked."""
+    left, top, width, height = cv2.boundingRect(mask)
+    return slice(max(0, top - margin), top + height + margin), slice(max(0, left - margin), left + width + margin)
 
 
 def _group_means(values: Floats, group: NDArray[np.int64], here: NDArray[np.bool_]) -> Floats:
@@ -207,44 +250,50 @@ def _group_means(values: Floats, group: NDArray[np.int64], here: NDArray[np.bool
     return (total / np.maximum(count, 1))[group].astype(np.float32)
 
 
-def _worthiest(plan: Plan, current: Floats, aim: Floats, coat: Pass, cells: float) -> NDArray[np.int64]:
+def _worthiest(plan: Plan, current: Floats, aim: Floats, coat: Pass, cells: float) -> NDArray[np.uint8]:
     """The crayon (h, w) that gains most, where neighbours agree over `coat.cohere` tips; on a grid half as fine."""
     h, w = aim.shape[:2]
     half = (w // 2, h // 2)
     swatches, recipes = plan.swatches, plan.recipes
-    group = cv2.resize(plan.group.astype(np.int16), half, interpolation=cv2.INTER_NEAREST).astype(np.int64)
-    used = recipes.crayons()
-    need = np.full((half[1], half[0]), sum(1 << k for k in used), np.uint64)
+    group = cv2.resize(plan.group.astype(np.int16), half, interpolation=cv2.INTER_NEAREST)
+    base, shade = recipes.base[group], recipes.shade[group]
     now, then = (np.asarray(cv2.resize(m, half, interpolation=cv2.INTER_AREA), np.float32) for m in (current, aim))
-    gain, _ = gains(now, then, swatches, need, coat, plan.threads)
-    worth = np.full(gain.shape, -9, np.float32)
+    everywhere = np.ones(base.shape, np.uint8)
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
-    for k in used:
-        home = (recipes.base[group] == k) | (recipes.shade[group] == k)
-        worth[k] = blur(gain[k], 0.5 * coat.cohere * cells) - np.where(home, 0, STRANGER_PRICE)
-        worth[k] -= CLASH_PRICE * clash(hues[k], then[..., 1:])
-    return cv2.resize(worth.argmax(0).astype(np.int16), (w, h), interpolation=cv2.INTER_NEAREST).astype(np.int64)
+
+    def worth(k: int) -> Floats:
+        gain, _ = gains(now, then, (0, 0), everywhere, swatches, k, coat)
+        price = np.float32(CLASH_PRICE) * clash(hues[k], then[..., 1:])
+        price += np.where((base == k) | (shade == k), 0, np.float32(STRANGER_PRICE))
+        return blur(gain, 0.5 * coat.cohere * cells) - price
+
+    used = recipes.crayons()
+    best = np.stack(list(plan.pool.map(worth, used))).argmax(0).astype(np.uint8)
+    return np.array(used, np.uint8)[cv2.resize(best, (w, h), interpolation=cv2.INTER_NEAREST)]
 
 
-def grouped(lab: Floats, recipes: Recipes, sigma: float, ragged: Floats) -> NDArray[np.int64]:
+def grouped(lab: Floats, recipes: Recipes, sigma: float, ragged: Floats, pool: Executor) -> NDArray[np.int64]:
     """The recipe (h, w) of each place: its nearest group of colours, after neighbours have voted.
 
     `ragged` (h, w) tilts the votes to and fro in streaks, so that areas meet as hatching does.
     """
     label = nearest(lab * np.array([TONE, 1, 1], np.float32), recipes.centres)
+
+    def votes(g: int) -> Floats:
+        given = blur((label == g).astype(np.float32), sigma)
+        return given + ragged * (given > 0.02) * np.float32(1 if g % 2 else -1)
+
     most, winner = np.full(label.shape, -1, np.float32), np.zeros(label.shape, np.int64)
-    for g in range(len(recipes.centres)):
-        votes = blur((label == g).astype(np.float32), sigma)
-        votes += ragged * (votes > 0.02) * (1 if g % 2 else -1)
-        winner[votes > most] = g
-        most = np.maximum(most, votes)
+    for g, given in enumerate(pool.map(votes, range(len(recipes.centres)))):
+        winner[given > most] = g
+        np.maximum(most, given, out=most)
     return winner
 
 
 def streaks(shape: tuple[int, ...], cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:
     """Noise of unit variance in streaks along the wrist's direction, about one line wide and ten long."""
     angle = np.deg2rad(wrist_deg)
-    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
+    y, x = np.ogrid[: shape[0], : shape[1]]
     along = (x * np.cos(angle) + y * np.sin(angle)) / (9 * cells)
     across = (y * np.cos(angle) - x * np.sin(angle)) / (1.3 * cells)
     along, across = along - along.min(), across - across.min()

@@ -1,5 +1,6 @@
 """Reading the photo: directions, tones and sizes that are known beforehand."""
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import get_type_hints
 
 import cv2
@@ -209,7 +210,7 @@ def test_scene_of_a_photo_is_finite_on_every_shape():
     for shape in ((1, 1), (1, 50), (50, 1), (2, 2), (5, 400)):
         photo = np.random.default_rng(5).random((*shape, 3)).astype(np.float32)
         scale = 297 / max(shape)
-        scene = analysis.read(photo, shape[1] * scale, shape[0] * scale, box(), Style(), [])
+        scene = analysis.read(photo, shape[1] * scale, shape[0] * scale, box(), Style(), [], ThreadPoolExecutor(2))
         for values in (scene.target, scene.lab, scene.calm, scene.tangent, scene.coherence, scene.detail):
             assert values.dtype == np.float32 and np.isfinite(values).all()
             assert values.shape[:2] == analysis.work_shape(shape[1] * scale, shape[0] * scale)

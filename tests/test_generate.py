@@ -1,5 +1,6 @@
 """The generator as a whole: any picture gives strokes that can be drawn, the same ones for the same seed."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import cv2
@@ -167,7 +168,7 @@ def test_logo_takes_the_paper_for_what_is_transparent():
 def test_likeness_from_afar():
     """The closed loop ends near its target on a sheet that does what the table says."""
     photo = PICTURES["clouds"]
-    aim = analysis.read(photo, *sheet_mm(photo), TABLE, load_style("artist"), []).target
+    aim = analysis.read(photo, *sheet_mm(photo), TABLE, load_style("artist"), [], ThreadPoolExecutor(2)).target
     target = analysis.far(analysis.fit(aim, (90, 120)))
     off = [np.linalg.norm(analysis.far(shown(photo, strokes)) - target, axis=2).mean()
            for strokes in ([], strokes_for(photo))]  # fmt: skip

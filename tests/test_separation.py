@@ -1,5 +1,6 @@
 """Which crayon where: the kernels against slow twins, and what must never be wanted."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import cv2
@@ -13,7 +14,7 @@ from stroke_gen.params import Pass
 from stroke_gen.separation import Plan, base_pressure, gains, grouped, plates, streaks
 
 TABLE = box()
-ALL = np.uint64(2 ** len(TABLE.names) - 1)
+POOLS = {n: ThreadPoolExecutor(n) for n in (1, 2, 4)}
 TIP = 6.0  # cells
 KINDS = ["base", "shade", "free"]
 
@@ -26,7 +27,7 @@ def plan_for(photo, table=TABLE, threads=2):
     zero = np.zeros((h, w), np.float32)
     scene = analysis.Scene(photo, lab, photo, field, zero, zero, 0.4)
     mixes = recipes.find(lab, table, 10, 9, np.random.default_rng(0))
-    return Plan(scene, table, mixes, grouped(lab, mixes, 1.0, zero), threads)
+    return Plan(scene, table, mixes, grouped(lab, mixes, 1.0, zero, POOLS[2]), POOLS[threads])
 
 
 def wanted(photo, coat, flat=0.0, now=None, plan=None):
@@ -41,11 +42,8 @@ def halves(left, right, shape=(60, 100)):
     return photo
 
 
-def slow_gains(current, lab, table, need, coat):
+def slow_gains(current, lab, table, k, coat):
     """What `gains` promises, one formula after the other."""
-    h, w = current.shape[:2]
-    gain = np.full((len(table.names), h, w), separation.UNASKED)
-    best = np.zeros(gain.shape, int)
     usable = [p for p in range(len(table.pressures)) if table.pressures[p] <= coat.hardest] or [0]
 
     def error(light):
@@ -53,16 +51,12 @@ def slow_gains(current, lab, table, need, coat):
         return np.sqrt(coat.tone * d[..., 0] ** 2 + d[..., 1] ** 2 + d[..., 2] ** 2), d[..., 0]
 
     before, _ = error(current)
-    for k in range(len(table.names)):
-        each = []
-        for p in usable:
-            after, lighter = error(table.a[k, p] * current + table.b[k, p])
-            after += coat.dark_price * np.maximum(0, -lighter) + separation.GRAIN_PRICE * table.grain[k, p]
-            each.append(before - after)
-        asked = (need >> np.uint64(k)) & np.uint64(1) > 0
-        gain[k][asked] = np.max(each, 0)[asked]
-        best[k][asked] = np.argmax(each, 0)[asked]
-    return gain, best
+    each = []
+    for p in usable:
+        after, lighter = error(table.a[k, p] * current + table.b[k, p])
+        after += coat.dark_price * np.maximum(0, -lighter) + separation.GRAIN_PRICE * table.grain[k, p]
+        each.append(before - after)
+    return np.max(each, 0), np.argmax(each, 0)
 
 
 COATS = [Pass(), Pass(tone=0.3, dark_price=1.0), Pass(hardest=0.4), Pass(hardest=0.03)]
@@ -72,20 +66,34 @@ COATS = [Pass(), Pass(tone=0.3, dark_price=1.0), Pass(hardest=0.4), Pass(hardest
 def test_gains_are_those_of_the_slow_twin(coat):
     rng = np.random.default_rng(1)
     current, target = rng.random((2, 45, 30, 3)).astype(np.float32)
-    need = rng.integers(0, 2 ** len(TABLE.names), (45, 30)).astype(np.uint64)
-    gain, best = gains(current, oklab(target), TABLE, need, coat, 2)
-    slow, slow_best = slow_gains(current, oklab(target), TABLE, need, coat)
-    assert np.abs(gain - slow).max() < 1e-3
-    assert (best != slow_best).mean() < 0.01  # ties may fall either way
+    need = rng.integers(0, 2, (40, 20)).astype(np.uint8)
+    window, asked = np.s_[3:43, 7:27], need > 0
+    for k in range(len(TABLE.names)):
+        gain, best = gains(current, oklab(target), (3, 7), need, TABLE, k, coat)
+        slow, slow_best = slow_gains(current[window], oklab(target[window]), TABLE, k, coat)
+        assert np.abs(gain - slow)[asked].max() < 1e-3
+        assert (best != slow_best)[asked].mean() < 0.01  # ties may fall either way
+        assert (gain[~asked] == separation.UNASKED).all() and (best[~asked] == 0).all()
 
 
-def test_gains_are_the_same_with_any_number_of_threads():
-    rng = np.random.default_rng(2)
-    current, target = rng.random((2, 130, 40, 3)).astype(np.float32)
-    need = np.full((130, 40), ALL)
-    results = [gains(current, oklab(target), TABLE, need, Pass(), n) for n in (1, 2, 4)]
-    for gain, best in results[1:]:
-        assert (gain == results[0][0]).all() and (best == results[0][1]).all()
+@pytest.mark.parametrize("kind", KINDS)
+def test_plates_are_the_same_with_any_number_of_threads(kind):
+    photo = cv2.GaussianBlur(np.random.default_rng(2).random((130, 80, 3)).astype(np.float32), (0, 0), 3)
+    first, *others = (wanted(photo, Pass(kind=kind), plan=plan_for(photo, threads=n)) for n in POOLS)
+    for other in others:
+        assert first.keys() == other.keys() and all((first[k] == other[k]).all() for k in first)
+
+
+def test_a_plate_does_not_depend_on_what_lies_far_away():
+    """A crayon's plate is worked out in a window; another one's area makes that window larger."""
+    red = TABLE.over(TABLE.paper)[TABLE.names.index("red"), 4]
+    photo = np.tile(PAPER, (120, 160, 1)).astype(np.float32)
+    photo[30:60, 20:50] = red
+    both = photo.copy()
+    both[90:110, 110:150] = red
+    alone, beside = (wanted(p, Pass(kind="base"), plan=plan_for(both)) for p in (photo, both))
+    k = TABLE.names.index("red")
+    assert alone[k][:75].any() and (alone[k][:75] == beside[k][:75]).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -164,7 +172,7 @@ def test_pressure_follows_tone_without_steps():
 
 def test_base_pressure_is_the_same_with_any_number_of_threads():
     photo = np.random.default_rng(4).random((100, 60, 3)).astype(np.float32)
-    results = [base_pressure(plan_for(photo, threads=n), oklab(photo)) for n in (1, 2, 4)]
+    results = [base_pressure(plan_for(photo, threads=n), oklab(photo)) for n in POOLS]
     assert (results[0] == results[1]).all() and (results[0] == results[2]).all()
 
 
@@ -181,8 +189,8 @@ def test_neighbours_agree_on_a_recipe():
     photo[30, 20] = (0.03, 0.3, 0.06)
     lab, zero = oklab(photo), np.zeros(photo.shape[:2], np.float32)
     mixes = recipes.find(lab, TABLE, 6, 9, np.random.default_rng(0))
-    assert len(np.unique(grouped(lab, mixes, 0.0, zero))) == 2
-    group = grouped(lab, mixes, 2.0, zero)
+    assert len(np.unique(grouped(lab, mixes, 0.0, zero, POOLS[2]))) == 2
+    group = grouped(lab, mixes, 2.0, zero, POOLS[2])
     assert (group[:, :48] == group[0, 0]).all() and (group[:, 52:] == group[0, 99]).all()
     assert group[0, 0] != group[0, 99]
 
