@@ -1,5 +1,7 @@
 """The Python interface: what goes in comes out, the same drawing by every way."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -149,24 +151,71 @@ def test_notes_hold_no_folder(photo, tmp_path):
 
 def test_memory_refuses_what_cannot_fit_and_names_a_size_that_does():
     memory.check_fits(1000, 1000, available=None if memory.available_bytes() is None else 10**12)
-    figures = r"size: 20000 x 10000 cells need 17\.2 GB of memory, 4\.0 GB are free"
+    figures = r"size: 20000 x 10000 cells need 15\.3 GB of memory, 4\.0 GB are free"
     with pytest.raises(ValueError, match=figures) as error:
         memory.check_fits(10000, 20000, available=4 * 10**9)
     fitting = int(str(error.value).split("a size of ")[1].split()[0])
     memory.check_fits(fitting // 2, fitting, available=4 * 10**9)
     with pytest.raises(ValueError):
         memory.check_fits(round(fitting * 0.51), round(fitting * 1.02), available=4 * 10**9)
+    with pytest.raises(ValueError):
+        memory.check_fits(fitting // 2, fitting, filmed=True, available=4 * 10**9)
 
 
 def test_no_size_is_named_if_none_fits():
     with pytest.raises(ValueError) as error:
-        memory.check_fits(100, 100, available=10**6)
+        memory.check_fits(100, 100, available=memory.OVERHEAD + 1000)
     assert "would fit" not in str(error.value)
+
+
+def test_a_photo_that_cannot_be_read_is_refused():
+    deep = memory.decoding("PNG", 200_000_000, deep=True)
+    with pytest.raises(ValueError, match=r"the photo needs 3\.9 GB of memory, 2\.0 GB are free; reduce it first"):
+        memory.check_fits(100, 100, photo=deep, available=2 * 10**9)
+    memory.check_fits(100, 100, photo=memory.decoding("PNG", 200_000_000), available=2 * 10**9)
+    assert memory.decoding("something new", 1) == memory.decoding("JPEG", 1, deep=True)
+    assert memory.decoding(None, 10**9) == 0
+
+
+def test_memory_is_looked_at_before_the_photo_is_read(photo, tmp_path, monkeypatch):
+    Image.fromarray(photo).save(tmp_path / "photo.png")
+    monkeypatch.setattr(memory, "available_bytes", lambda: 2_000_000_000)
+    monkeypatch.setattr("crayonize.image_read.read_linear", lambda *_: pytest.fail("began to read"))
+    for image in (photo, Image.fromarray(photo), tmp_path / "photo.png"):
+        with pytest.raises(ValueError, match=r"size: 20000 x \d+ cells need \d+\.\d GB of memory, 2\.0 GB are free"):
+            crayonize.convert(image, size=20000)
+
+
+STATUS = Path("/proc/self/status")
+
+
+@pytest.mark.skipif(not STATUS.exists(), reason="the system does not tell a process its peak of memory")
+@pytest.mark.parametrize("suffix", [".png", ".webp"])
+def test_a_drawing_takes_no_more_memory_than_said_and_not_much_less(photo, tmp_path, suffix):
+    Image.fromarray(photo).save(tmp_path / "photo.png")
+    script = (
+        "import sys, pathlib, crayonize; crayonize.convert(*sys.argv[1:3], size=2100);"
+        f"print(pathlib.Path({str(STATUS)!r}).read_text())"
+    )
+    files = tmp_path / "photo.png", tmp_path / f"out{suffix}"
+    told = subprocess.run([sys.executable, "-c", script, *files], capture_output=True, text=True, check=True).stdout
+    peak = 1024 * int(told.split("VmHWM:")[1].split()[0])
+    said = memory.OVERHEAD + memory.BYTES_PER_CELL * 2100 * 1400
+    assert 0.7 * said < peak < said
 
 
 def test_memory_of_this_machine_is_plausible():
     free = memory.available_bytes()
     assert free is None or 10**7 < free < 10**14
+
+
+def test_the_limit_of_addresses_counts(monkeypatch):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (10**15, 10**15))
+    used = 10**15 - next(memory._of_process())
+    assert 10**7 < used < 10**14
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (resource.RLIM_INFINITY,) * 2)
+    assert list(memory._of_process()) == []
 
 
 def test_limits_of_control_groups(tmp_path):

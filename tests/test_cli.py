@@ -66,6 +66,7 @@ def drawn(photo, tmp_path_factory):
     (["--help"], "--palette"),
     (["draw", "--help"], "DRAWING"),
     (["warmup", "--help"], "--quiet"),
+    (["bench", "--help"], "--quick"),
     (["--version"], "crayonize 0."),
     (["palettes"], "box24 "),
     (["styles"], "artist "),
@@ -200,6 +201,11 @@ BAD = [
     (2, ["draw", TEXT, OUT, "--sise", "3"], "--sise", "--size"),
     (2, ["palettes", "x"], "x"),
     (2, ["warmup", "--fast"], "--fast"),
+    (2, ["bench", "--quik"], "--quik", 'did you mean "--quick"'),
+    (2, ["bench", "x"], "x is one too many"),
+    (2, ["bench", "--json"], "--json"),
+    (2, ["bench", "--json", "{tmp}/missing/all.json"], "missing", "folder"),
+    (2, ["bench", "--json", FOLDER], "folder"),
 ]  # fmt: skip
 
 

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms, ImageFile
 
-from crayonize import image_scan, image_write
+from crayonize import image_scan, image_write, memory
 from crayonize.image_color import decode_srgb, encode_srgb, light_from_profile
-from crayonize.image_read import read_linear
+from crayonize.image_read import measured, read_linear
 from crayonize.image_write import file_format, read_settings, same_file, write_image
 
 SUFFIXES = (".png", ".jpg", ".webp", ".tif")
@@ -187,6 +187,18 @@ def stored_for(upright, orientation):
     flip_rows, flip_columns = rows in ("bottom", "right"), columns in ("bottom", "right")
     assert swapped == (columns in ("top", "bottom"))
     return np.ascontiguousarray(upright[:: -1 if flip_rows else 1, :: -1 if flip_columns else 1])
+
+
+def test_a_header_tells_size_and_memory(tmp_path, monkeypatch):
+    deep = np.zeros((30, 50, 3), np.uint16)
+    cv2.imwrite(str(tmp_path / "deep.png"), deep)
+    path = saved(tmp_path, noise(30, 50, 3), "a.png")
+    monkeypatch.setattr(ImageFile.ImageFile, "load", lambda _: pytest.fail("decoded"))
+    assert measured(path) == (50, 30, memory.decoding("PNG", 1500))
+    assert measured(tmp_path / "deep.png") == (50, 30, memory.decoding("PNG", 1500, deep=True))
+    assert measured(deep) == measured(Image.new("RGB", (50, 30))) == (50, 30, 0)
+    with pytest.raises(ValueError, match="shape"):
+        measured(np.zeros(3))
 
 
 @pytest.mark.parametrize("suffix", [*SUFFIXES, ".avif"])

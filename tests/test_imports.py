@@ -21,6 +21,7 @@ def modules_after(code):
 
 @pytest.mark.parametrize("words", [
     ["--help"], ["--version"], ["draw", "--help"], ["warmup", "--help"], ["palettes"], ["styles"], ["papers"],
+    ["bench", "--help"], ["bench", "--json", "/missing/all.json"],
     ["photo.jpg", "--palete", "box8"], ["photo.jpg", "--seed", "x"],
 ], ids=" ".join)  # fmt: skip
 def test_quick_commands_load_nothing_heavy(words):

@@ -7,6 +7,7 @@ from bench_sheet import Bench
 from test_wax import old_wax
 
 from crayonize import optics, rub
+from crayonize.image_color import encode_srgb
 
 over = optics._over
 
@@ -169,10 +170,40 @@ def test_relief_looks_the_same_at_both_resolutions(table):
     assert lit[1] == pytest.approx(lit[0], rel=0.15)
 
 
-def test_any_number_of_threads_gives_the_same_picture(table, monkeypatch):
+@pytest.fixture
+def waxed(table):
+    """A sheet of 61 x 30 cells with all kinds of wax on it."""
     rng = np.random.default_rng(6)
-    sheet = old_wax(table.sheet(40 * rng.random((2 * optics.BAND + 7, 30))), rng)
-    pictures = [optics.render(sheet, (1.0, 0.9, 0.8), threads=n) for n in (1, 2, 3, 4)]
-    monkeypatch.setattr(optics, "BAND", 10**6)  # all rows at once
-    pictures.append(optics.render(sheet, (1.0, 0.9, 0.8)))
-    assert len({picture.tobytes() for picture in pictures}) == 1
+    return old_wax(table.sheet(40 * rng.random((61, 30))), rng)
+
+
+def everything(sheet, threads):
+    """All that can be made of a sheet: its picture, the same in 8 bits, and reduced."""
+    ground = (1.0, 0.9, 0.8)
+    return (
+        optics.render(sheet, ground, threads=threads),
+        optics.render_srgb(sheet, ground, threads=threads),
+        optics.render_reduced(sheet, ground, (17, 9), threads=threads),
+    )
+
+
+def test_any_number_of_threads_and_bands_gives_the_same_pictures(waxed, monkeypatch):
+    whole = everything(waxed, 1)
+    for band in (1, 90, 700):
+        monkeypatch.setattr(optics, "BAND", band)
+        for threads in (1, 3):
+            for one, same in zip(everything(waxed, threads), whole, strict=True):
+                np.testing.assert_array_equal(one, same)
+
+
+def test_eight_bits_are_the_picture_encoded(waxed):
+    picture = optics.render(waxed, (1.0, 0.9, 0.8))
+    np.testing.assert_array_equal(optics.render_srgb(waxed, (1.0, 0.9, 0.8)), encode_srgb(picture))
+
+
+def test_the_reduced_picture_is_a_mean_over_areas(waxed):
+    picture = optics.render(waxed, (1.0, 0.9, 0.8), light=False).astype(np.float64)
+    for rows, cols in ((61, 30), (17, 9), (1, 1)):
+        seen = optics.render_reduced(waxed, (1.0, 0.9, 0.8), (rows, cols))
+        fine = np.repeat(np.repeat(picture, rows, 0), cols, 1)  # each cell of the grid is now 61 x 30 of these
+        np.testing.assert_allclose(seen, fine.reshape(rows, 61, cols, 30, 3).mean((1, 3)), atol=2e-6)

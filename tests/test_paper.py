@@ -92,6 +92,17 @@ def test_dots_keep_their_distance_over_the_seam(monkeypatch):
     np.testing.assert_allclose(gaps.min(0), 17, atol=4)
 
 
+@pytest.mark.parametrize("spot_shape", [(3, 5), (9, 12)], ids=["smaller", "larger than the lattice"])
+def test_a_spot_is_laid_on_every_point_of_the_lattice_and_wraps_round(spot_shape):
+    rng = np.random.default_rng(2)
+    noise, spot = rng.random((6, 10), np.float32), rng.random(spot_shape, np.float32)
+    laid = sum(
+        weight * np.roll(noise, (j - spot.shape[0] // 2, i - spot.shape[1] // 2), (0, 1))
+        for (j, i), weight in np.ndenumerate(spot)
+    )
+    np.testing.assert_allclose(paper._convolve(noise.copy(), spot), laid, rtol=1e-5)
+
+
 def test_the_seed_alone_decides():
     np.testing.assert_array_equal(heights("felt", 60, seed=4), heights("felt", 60, seed=4))
     assert np.abs(heights("felt", 60, seed=4) - heights("felt", 60, seed=5)).mean() > 1

@@ -4,17 +4,19 @@
 
     convert("photo.jpg", "out.png", palette="box24", seed=1)
 
-Importing this is cheap; numpy, numba and OpenCV are loaded by the first call.
+`Live` is a sheet to draw on by hand. Importing this is cheap; numpy, numba and OpenCV are loaded by the first
+call, or with `Live`.
 """
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .api import convert, draw
+    from .live import Live
     from .settings import Settings
 
 __version__ = "0.1.0"
-__all__ = ["Settings", "convert", "draw"]
+__all__ = ["Live", "Settings", "convert", "draw"]
 
 
 def __getattr__(name: str) -> Any:
@@ -23,6 +25,13 @@ def __getattr__(name: str) -> Any:
         from . import api
 
         return getattr(api, name)
+    if name == "Live":
+        from . import api
+
+        api.workshop()  # first: it says where its kernels are kept
+        from .live import Live
+
+        return Live
     if name == "Settings":
         from .settings import Settings
 

@@ -184,11 +184,12 @@ def sketch(
 ) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
     from . import paper
-    from .image_read import read_linear
+    from .image_read import measured, read_linear
 
+    width, height, reading = measured(image)
+    check_size(width, height, settings.size, settings.preview, photo=reading, filmed=watch is not None)
     ground = paper.colour_linear(paper.load_paper(settings.paper).colour)
     photo = read_linear(image, PHOTO_SIDE, ground)
-    check_size(photo.shape[1], photo.shape[0], settings.size, settings.preview)
     drawn: tuple[Drawing, Easel] = workshop().sketch(photo, settings, progress, watch)
     return drawn
 
@@ -210,7 +211,7 @@ def redraw(
     _check_threads(threads)
     check_outputs([drawing], out)
     drawing = drawing if isinstance(drawing, Drawing) else load_strokes(drawing)
-    check_size(drawing.width_mm, drawing.height_mm, size, preview)
+    check_size(drawing.width_mm, drawing.height_mm, size, preview, filmed=watch is not None)
     easel: Easel = workshop().draw(drawing, size, threads=threads, preview=preview, progress=progress,
                                    watch=watch)  # fmt: skip
     return drawing, easel
@@ -248,10 +249,10 @@ def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress
     return steps.save_steps(drawing, out, progress)
 
 
-def check_size(width: float, height: float, size: int, preview: bool) -> None:
-    """ValueError if the sheet for a picture of these proportions does not fit into memory."""
+def check_size(width: float, height: float, size: int, preview: bool, *, photo: int = 0, filmed: bool = False) -> None:
+    """ValueError if the sheet for a picture of these proportions does not fit into memory; see memory.check_fits."""
     cell = max(width, height) / (size / 2 if preview else size)
-    memory.check_fits(max(1, round(height / cell)), max(1, round(width / cell)))
+    memory.check_fits(max(1, round(height / cell)), max(1, round(width / cell)), photo=photo, filmed=filmed)
 
 
 def finish(
@@ -272,10 +273,9 @@ def finish(
     """
     from stroke_gen.drawing import save_drawing
 
-    from .image_color import encode_srgb
     from .image_write import write_image
 
-    picture = encode_srgb(easel.picture(light))
+    picture = easel.picture_srgb(light)
     if legend:
         from .legend import with_legend
 
@@ -283,7 +283,8 @@ def finish(
     if out is not None:
         dpi = easel.sheet.cols / drawing.width_mm * _MM_PER_INCH
         told = notes(drawing, settings) | {"light": light, "smears": easel.smears}
-        write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None, kept=kept)
+        write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None, kept=kept,
+                    threads=easel.threads)  # fmt: skip
     if strokes is not None:
         if Path(strokes).suffix.lower() == ".svg":
             from .svg_out import save_svg

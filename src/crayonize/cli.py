@@ -1,8 +1,8 @@
 """The command `crayonize`: options in, one picture out, errors as one line.
 
-The first word chooses: draw, steps, palettes, styles, papers or warmup; anything else is a photo. Only here is
-anything printed: what was asked for on stdout, all else on stderr. `--help` and the listings load neither
-numpy nor numba, so imports of anything heavy stand inside functions.
+The first word chooses: draw, steps, palettes, styles, papers, warmup or bench; anything else is a photo. Only
+here is anything printed: what was asked for on stdout, all else on stderr. `--help` and the listings load
+neither numpy nor numba, so imports of anything heavy stand inside functions.
 
 Exit codes: 0 done; 1 stopped (an output cannot be written, an error of ours); 2 the command line, or a file
 it names, cannot be used; 3 an extra package is missing; 130 Ctrl-C; 143 terminated.
@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -36,6 +36,7 @@ other commands:
   crayonize steps DRAWING OUT.pdf   pages that show how to draw it, step by step
   crayonize palettes|styles|papers  list what there is
   crayonize warmup                  compile everything for this machine now
+  crayonize bench                   measure how fast it is on this machine
 """
 
 
@@ -203,6 +204,30 @@ def _warmup(words: Sequence[str]) -> int:
     return 0
 
 
+def _bench(words: Sequence[str]) -> int:
+    """crayonize bench: measure, and print a table."""
+    parser = _Parser("crayonize bench", "Measure how fast it is on this machine; takes some minutes.")
+    parser.add_argument("--json", metavar="FILE", help="write all figures there; - writes them to stdout, and no table")
+    parser.add_argument("--quick", action="store_true", help="half a minute: smaller pictures, each measured once")
+    _add_talk(parser)
+    options = parser.read(words)
+
+    import json
+
+    from . import bench
+    from .whole_file import whole_file
+
+    aside = options.json is not None and options.json != "-"
+    with whole_file(options.json) if aside else nullcontext() as part, _talk(options) as progress:
+        if part:
+            part.touch()  # better now than after some minutes
+        found = bench.measure(options.quick, progress)
+        if part:
+            part.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    print(json.dumps(found, indent=1) if options.json == "-" else bench.table(found))
+    return 0
+
+
 def _palettes(words: Sequence[str]) -> int:
     """crayonize palettes: list the boxes of crayons."""
     _Parser(prog="crayonize palettes", description="List the boxes of crayons, for --palette.").read(words)
@@ -241,6 +266,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "styles": _styles,
     "papers": _papers,
     "warmup": _warmup,
+    "bench": _bench,
 }
 
 

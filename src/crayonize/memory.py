@@ -5,26 +5,49 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-BYTES_PER_CELL = 84  # the sheet 57; its light, or its picture on the way into a file, 12 to 24
-OVERHEAD = 400_000_000  # the libraries, the photo, the planner's work, the strokes
+BYTES_PER_CELL = 75  # the sheet 57, its picture 3, which takes 2 (PNG) to 16 (WebP) more on its way into a file
+BYTES_PER_FILMED_CELL = 12  # the light on the sheet, which is kept while it is filmed
+OVERHEAD = 340_000_000  # the libraries, the reduced photo, the planner's work, the strokes
+
+# Bytes a pixel while a photo is decoded and reduced, measured on 50 million pixels. Colour of 16 bits is
+# decoded twice.
+_DECODING = {"JPEG": 7, "PNG": 7, "TIFF": 7, "WEBP": 16, "AVIF": 10, "HEIF": 10}
+_DEEP = 18
 
 
-def check_fits(rows: int, cols: int, available: int | None = None) -> None:
-    """ValueError naming the figures if a sheet of rows x cols cells does not fit into memory."""
-    needed = rows * cols * BYTES_PER_CELL + OVERHEAD
+def decoding(format_: str | None, pixels: int, deep: bool = False) -> int:
+    """Bytes taken, before there is a sheet, to read a photo. deep: colour of 16 bits. No format: it has been read."""
+    if format_ is None:
+        return 0
+    return (_DEEP if deep else _DECODING.get(format_, _DEEP)) * pixels
+
+
+def check_fits(rows: int, cols: int, *, photo: int = 0, filmed: bool = False, available: int | None = None) -> None:
+    """ValueError naming the figures if a drawing on a sheet of rows x cols cells does not fit into memory.
+
+    photo: bytes that reading the photo takes.   available: bytes, if not what the machine has.
+    """
     free = available_bytes() if available is None else available
-    if free is None or needed <= free:
+    if free is None:
         return
-    shrink = math.sqrt(max(0, free - OVERHEAD) / (needed - OVERHEAD))
-    fitting = int(max(rows, cols) * shrink)
-    advice = f"; a size of {fitting} would fit" if fitting >= 16 else ""
-    figures = f"{needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free"
-    raise ValueError(f"size: {cols} x {rows} cells need {figures}{advice}")
+    if OVERHEAD + photo > free:
+        raise ValueError(f"the photo needs {_figures(OVERHEAD + photo, free)}; reduce it first")
+    per_cell = BYTES_PER_CELL + BYTES_PER_FILMED_CELL * filmed
+    if OVERHEAD + rows * cols * per_cell > free:
+        fitting = int(max(rows, cols) * math.sqrt((free - OVERHEAD) / (rows * cols * per_cell)))
+        advice = f"; a size of {fitting} would fit" if fitting >= 16 else ""
+        raise ValueError(
+            f"size: {cols} x {rows} cells need {_figures(OVERHEAD + rows * cols * per_cell, free)}{advice}"
+        )
+
+
+def _figures(needed: int, free: int) -> str:
+    return f"{needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free"
 
 
 def available_bytes() -> int | None:
-    """Memory that may still be taken, by the machine's count and by the limits of our control groups."""
-    return min((*_of_machine(), *_of_groups()), default=None)
+    """Memory that may still be taken, by the machine's count and the limits that we are under."""
+    return min((*_of_machine(), *_of_process(), *_of_groups()), default=None)
 
 
 def _of_machine() -> Iterator[int]:
@@ -32,6 +55,17 @@ def _of_machine() -> Iterator[int]:
         for line in Path("/proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
                 yield int(line.split()[1]) * 1024
+
+
+def _of_process() -> Iterator[int]:
+    """What `ulimit -v` leaves of the addresses."""
+    with suppress(ImportError, OSError):  # another system
+        import resource
+
+        most = resource.getrlimit(resource.RLIMIT_AS)[0]
+        used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        if most != resource.RLIM_INFINITY:
+            yield max(0, most - used)
 
 
 def _of_groups() -> Iterator[int]:

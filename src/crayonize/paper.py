@@ -8,6 +8,7 @@ import functools
 import os
 import re
 import tomllib
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from importlib import resources
 from typing import Any
@@ -16,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .did_you_mean import did_you_mean
+
+Floats = NDArray[np.float32]
 
 PATCH = 2048  # cells along one side of the periodic patch, at most
 
@@ -87,24 +90,30 @@ def colour_linear(colour: str) -> tuple[float, float, float]:
     return r, g, b
 
 
-def tooth(paper: Paper, rows: int, cols: int, cell_mm: float, seed: int) -> NDArray[np.float32]:
+def tooth(paper: Paper, rows: int, cols: int, cell_mm: float, seed: int) -> Floats:
     """Height field (rows, cols) in um of a paper on cells of `cell_mm`."""
     if paper.texture not in _TEXTURES:
         return _from_picture(paper, rows, cols)
-    shape = (min(PATCH, _even(rows)), min(PATCH, _even(cols)))
-    rng = np.random.default_rng([seed, 7])
-    wavelength = max(paper.wavelength_mm / cell_mm, 1.0)
-    field = _TEXTURES[paper.texture](shape, wavelength, rng)
-    low, high = np.percentile(field[:: max(1, shape[0] // 512), :: max(1, shape[1] // 512)], (0.5, 99.5))
-    patch = np.clip((field - low) / max(high - low, 1e-12), 0, 1).astype(np.float32)
-    patch = (1 - (1 - patch) ** np.float32(paper.pits)) * np.float32(paper.depth_um)
-    if patch.shape[0] >= rows and patch.shape[1] >= cols:
-        return np.ascontiguousarray(patch[:rows, :cols])
+    patch = _patch(paper, (min(PATCH, _even(rows)), min(PATCH, _even(cols))), cell_mm, seed)
+    high, wide = patch.shape
     out = np.empty((rows, cols), np.float32)
-    for y in range(0, rows, patch.shape[0]):
-        for x in range(0, cols, patch.shape[1]):
-            out[y : y + patch.shape[0], x : x + patch.shape[1]] = patch[: rows - y, : cols - x]
+    for y in range(0, rows, high):
+        for x in range(0, cols, wide):
+            out[y : y + high, x : x + wide] = patch[: rows - y, : cols - x]
     return out
+
+
+def _patch(paper: Paper, shape: tuple[int, int], cell_mm: float, seed: int) -> Floats:
+    """One period of a texture, as heights in um."""
+    wavelength = max(paper.wavelength_mm / cell_mm, 1.0)
+    patch = _TEXTURES[paper.texture](shape, wavelength, np.random.default_rng([seed, 7]))
+    low, high = np.percentile(patch[:: max(1, shape[0] // 512), :: max(1, shape[1] // 512)], (0.5, 99.5))
+    patch -= low
+    patch /= max(high - low, np.float32(1e-12))
+    np.clip(patch, 0, 1, out=patch)
+    if paper.pits != 1:
+        patch = 1 - (1 - patch) ** np.float32(paper.pits)
+    return patch * np.float32(paper.depth_um)
 
 
 def _even(n: int) -> int:
@@ -114,28 +123,31 @@ def _even(n: int) -> int:
     return int(cv2.getOptimalDFTSize(n + n % 2))
 
 
-def _convolve(noise: NDArray[np.float32], spot: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Periodic convolution of a lattice of noise with a spot (van Wijk's spot noise on a full lattice)."""
+def _convolve(noise: Floats, spot: Floats) -> Floats:
+    """A lattice of noise, convolved in its place, periodically, with a spot (van Wijk's spot noise)."""
+    import cv2
+
     kernel = np.zeros(noise.shape, np.float32)
-    n, m = spot.shape
-    for j in range(n):  # a spot larger than the lattice wraps round
-        for i in range(m):
-            kernel[(j - n // 2) % noise.shape[0], (i - m // 2) % noise.shape[1]] += spot[j, i]
-    spectrum = np.fft.rfft2(noise) * np.fft.rfft2(kernel)
-    return np.asarray(np.fft.irfft2(spectrum, s=noise.shape), np.float32)
+    down, along = (np.arange(n) - n // 2 for n in spot.shape)
+    np.add.at(kernel, (down[:, None] % noise.shape[0], along % noise.shape[1]), spot)  # a large spot wraps round
+    cv2.mulSpectrums(cv2.dft(noise, noise), cv2.dft(kernel, kernel), 0, noise)
+    return np.asarray(cv2.dft(noise, noise, cv2.DFT_INVERSE | cv2.DFT_SCALE), np.float32)
 
 
-def _lunar(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> NDArray[np.float32]:
+def _lunar(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> Floats:
     """The lunar texture: uniform noise convolved with a quarter-circle arc, four ways up for isotropy."""
-    field = np.zeros(shape, np.float32)
     spot = _arc(radius=2.2 * wavelength, width=max(0.55 * wavelength, 1.0))
-    for turn in range(4):
-        noise = rng.random(shape, np.float32) - np.float32(0.5)
-        field += _convolve(noise, np.rot90(spot, turn))
-    return field
+
+    def turned(noise: Floats, turn: int) -> Floats:
+        noise -= np.float32(0.5)
+        return _convolve(noise, np.rot90(spot, turn))
+
+    with ThreadPoolExecutor() as pool:  # convolves one lattice while the next is filled
+        turns = [pool.submit(turned, rng.random(shape, np.float32), turn) for turn in range(4)]
+    return _sum(turns)
 
 
-def _arc(radius: float, width: float) -> NDArray[np.float32]:
+def _arc(radius: float, width: float) -> Floats:
     """A quarter-circle arc drawn with anti-aliasing, sum 1; radius and width in cells."""
     fine = 4
     n = 2 * int(np.ceil(radius + width)) + 1
@@ -145,28 +157,41 @@ def _arc(radius: float, width: float) -> NDArray[np.float32]:
     return (spot / spot.sum()).astype(np.float32)
 
 
-def _stipple(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> NDArray[np.float32]:
+def _stipple(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> Floats:
     """Uniform noise whose amplitude a tiled mask of dots scales (Fig. 1, right)."""
     down = 2 * max(round(shape[0] / (8 * wavelength)), 1)  # whole dots and pairs of rows, so that patches join
     along = max(round(shape[1] / (4 * wavelength)), 1)
-    y, x = np.mgrid[: shape[0], : shape[1]] + 0.5
-    y, x = y * (down / shape[0]), x * (along / shape[1])
+    y, x = (np.arange(shape[0])[:, None] + 0.5) * (down / shape[0]), (np.arange(shape[1]) + 0.5) * (along / shape[1])
     dx, dy = (x + (y // 1 % 2) / 2) % 1 - 0.5, y % 1 - 0.5
-    dots = np.clip(1.35 - 2.6 * np.hypot(dx, dy), 0, 1)
-    return (dots * (0.35 + 0.65 * rng.random(shape))).astype(np.float32)
+    dots = np.clip(1.35 - 2.6 * np.hypot(dx, dy), 0, 1).astype(np.float32)
+    return np.asarray(dots * (0.35 + 0.65 * rng.random(shape)), np.float32)
 
 
-def _felt(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> NDArray[np.float32]:
+def _felt(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> Floats:
     """Drawing paper pressed on a felt: a fine tooth over slow swells (two bands of smooth noise)."""
-    field = np.zeros(shape, np.float32)
-    for scale, share in ((0.26, 0.8), (0.7, 0.45), (1.9, 0.25)):
-        noise = rng.standard_normal(shape, np.float32)
+
+    def band(noise: Floats, scale: float, share: float) -> Floats:
         smooth = _convolve(noise, _dome(max(scale * wavelength, 0.5)))
-        field += np.float32(share) * smooth / smooth.std()
-    return field
+        smooth *= np.float32(share) / smooth.std()
+        return smooth
+
+    with ThreadPoolExecutor() as pool:  # smooths one band while the next is filled with noise
+        bands = [
+            pool.submit(band, rng.standard_normal(shape, np.float32), scale, share)
+            for scale, share in ((0.26, 0.8), (0.7, 0.45), (1.9, 0.25))
+        ]
+    return _sum(bands)
 
 
-def _dome(sigma: float) -> NDArray[np.float32]:
+def _sum(parts: "list[Future[Floats]]") -> Floats:
+    """The sum of what is being computed, in the place of the first."""
+    total = parts[0].result()
+    for part in parts[1:]:
+        total += part.result()
+    return total
+
+
+def _dome(sigma: float) -> Floats:
     radius = int(np.ceil(3 * sigma))
     y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
     spot = np.exp(-(x * x + y * y) / (2 * sigma * sigma))
@@ -176,7 +201,7 @@ def _dome(sigma: float) -> NDArray[np.float32]:
 _TEXTURES = {"lunar": _lunar, "stipple": _stipple, "felt": _felt}
 
 
-def _from_picture(paper: Paper, rows: int, cols: int) -> NDArray[np.float32]:
+def _from_picture(paper: Paper, rows: int, cols: int) -> Floats:
     """A grey picture as a height field, white high, stretched over the sheet."""
     import cv2
 

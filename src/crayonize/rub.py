@@ -11,6 +11,7 @@ import threading
 import tomllib
 from collections.abc import Callable, Sequence
 from importlib import resources
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +65,8 @@ class Box:
         face = (int(face) + len(stroke.crayon)) % FACES
         shape = (stroke.tip, face, int(rest / SHARPEN_UM * WEAR_LEVELS), heading)
         if shape not in self._index:
-            self._index[shape] = len(self.masks)
             self.masks.append(self._mask(*shape))
+            self._index[shape] = len(self.masks) - 1
         return self._index[shape]
 
     def _mask(self, shape: Tip, face: int, level: int, heading: int) -> NDArray[np.float32]:
@@ -120,15 +121,13 @@ def rub(
     drawn = watch(points, first, reach) if watch else None
     cost = (cells / np.maximum(1, STEP * (side_of - 2 * box.reach)) + 1) * side_of**2
     loss = np.zeros(len(strokes), np.float64)
-    constants = box.constants.constants(sheet.cell_mm)
-    per_lambda = np.float32(1 / (box.constants.lam * sheet.cell_mm**2))
-    columns, desk = sheet.columns(), threading.local()
+    around, desk = surroundings(sheet, box, smears), threading.local()
 
     def draw(picked: NDArray[np.int64]) -> None:
         if not hasattr(desk, "window"):
             desk.window = window(masks.shape[1], len(sheet.optics))
-        _rub(picked, points, first, wax_of, mask_of, masks, sides, box.reach, np.float32(STEP), smears, constants,
-             per_lambda, sheet.rows, sheet.cols, columns, loss, desk.window)  # fmt: skip
+        _rub(picked, points, first, wax_of, mask_of, masks, sides, box.reach, np.float32(STEP), *around, loss,
+             desk.window)  # fmt: skip
         if drawn:
             drawn(picked)
 
@@ -140,6 +139,12 @@ def rub(
     for stroke, given in zip(strokes, loss * sheet.cell_mm**2 / 1000, strict=True):
         box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + float(given)
     return float(loss.sum())
+
+
+def surroundings(sheet: Sheet, box: Box, smears: bool) -> tuple[Any, ...]:
+    """What the kernels take beside strokes and tips: smears, constants, per_lambda, rows, cols, columns."""
+    per_lambda = np.float32(1 / (box.constants.lam * sheet.cell_mm**2))
+    return smears, box.constants.constants(sheet.cell_mm), per_lambda, sheet.rows, sheet.cols, sheet.columns()
 
 
 def _points(strokes: Sequence[Stroke], cell_mm: float) -> tuple[NDArray[np.float32], NDArray[np.int64]]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from crayonize.image_color import encode_srgb
 from crayonize.image_read import read_linear
 from crayonize.settings import Settings
 from stroke_gen.drawing import Drawing
@@ -23,7 +24,9 @@ def sketch(source: str, settings: Settings) -> tuple[Drawing, Any]:
     photo = read_linear(source, min(settings.size, 64))
     rows, cols = photo.shape[:2]
     act(Path(source))
-    easel = SimpleNamespace(picture=lambda light: photo, sheet=SimpleNamespace(cols=cols), smears=True)
+    picture = encode_srgb(photo)
+    sheet = SimpleNamespace(cols=cols)
+    easel = SimpleNamespace(picture_srgb=lambda light: picture, sheet=sheet, smears=True, threads=1)
     return Drawing(cols / 10, rows / 10, "drawing", settings.palette, (), seed=settings.seed), easel
 
 

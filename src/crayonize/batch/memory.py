@@ -2,24 +2,17 @@
 
 import os
 
-from ..memory import BYTES_PER_CELL, OVERHEAD, available_bytes
+from ..memory import BYTES_PER_CELL, OVERHEAD, available_bytes, decoding
 
 __all__ = ["SHARE", "available_bytes", "cores", "need", "workers"]
 
 SHARE = 0.7  # of the memory there is that several workers take together
 _USUAL_PHOTO = 24_000_000  # pixels
 
-# Bytes a pixel while a photo is decoded and reduced, measured on 50 million pixels. Colour of 16 bits is
-# decoded twice.
-_DECODING = {"JPEG": 7, "PNG": 7, "TIFF": 7, "WEBP": 16, "AVIF": 10, "HEIF": 10}
-_DEEP = 18
-
 
 def need(format_: str, pixels: int, size: int, deep: bool = False) -> int:
     """Bytes a worker takes for a photo drawn with `size` pixels on the long side. deep: colour of 16 bits."""
-    return (
-        OVERHEAD + (_DEEP if deep else _DECODING.get(format_, _DEEP)) * pixels + BYTES_PER_CELL * size * size
-    )
+    return OVERHEAD + decoding(format_, pixels, deep) + BYTES_PER_CELL * size * size
 
 
 def workers(available: int | None, size: int) -> int:
