@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -202,6 +203,16 @@ def test_a_drawing_takes_no_more_memory_than_said_and_not_much_less(photo, tmp_p
     peak = 1024 * int(told.split("VmHWM:")[1].split()[0])
     said = memory.OVERHEAD + memory.BYTES_PER_CELL * 2100 * 1400
     assert 0.7 * said < peak < said
+
+
+def test_threads_share_two_heaps_where_there_is_a_choice(monkeypatch):
+    asked = []
+    library = SimpleNamespace(mallopt=lambda *choice: asked.append(choice))
+    monkeypatch.setattr(memory.ctypes, "CDLL", lambda _: library)
+    memory.share_heaps()
+    assert asked == [(-8, 2)]
+    del library.mallopt
+    memory.share_heaps()
 
 
 def test_memory_of_this_machine_is_plausible():

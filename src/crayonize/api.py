@@ -189,8 +189,7 @@ def sketch(
     width, height, reading = measured(image)
     check_size(width, height, settings.size, settings.preview, photo=reading, filmed=watch is not None)
     ground = paper.colour_linear(paper.load_paper(settings.paper).colour)
-    photo = read_linear(image, PHOTO_SIDE, ground)
-    drawn: tuple[Drawing, Easel] = workshop().sketch(photo, settings, progress, watch)
+    drawn: tuple[Drawing, Easel] = workshop().sketch(read_linear(image, PHOTO_SIDE, ground), settings, progress, watch)
     return drawn
 
 
@@ -315,6 +314,7 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 @functools.cache
 def workshop() -> ModuleType:
     """The pipeline with all its kernels, these from the compile cache."""
+    memory.share_heaps()
     cache.before_kernels()
     from . import pipeline
 

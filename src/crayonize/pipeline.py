@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen import params
-from stroke_gen.analysis import fit
+from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
 from stroke_gen.generate import generate
 
@@ -121,6 +121,7 @@ def sketch(
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
+    photo = fit(photo, work_shape(width_mm, height_mm))  # all that is looked at; the large one may go
     style = _style(settings)
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
     stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
