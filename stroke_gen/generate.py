@@ -21,17 +21,18 @@ RAGGED = 0.12  # of all votes: how raggedly one recipe gives way to the next
 BOLD = 0.3  # distance from the paper, in OKLab, of the colours of an ordinary picture
 FINE_GAIN = 0.02  # the least gain that no pale picture makes smaller
 FAR_SIGHT = 1.5  # how much a free coat makes up for colours that are off when seen from afar
-Observe = Callable[[list[Stroke], tuple[int, int]], Floats]
+Draw = Callable[[list[Stroke]], None]
+Look = Callable[[tuple[int, int]], Floats]
 
 
 def generate(
     photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, seed: int, *,
-    observe: Observe, threads: int, focus: Sequence[tuple[float, float, float, float]] = (),
+    draw: Draw, look: Look, threads: int, focus: Sequence[tuple[float, float, float, float]] = (),
 ) -> list[Stroke]:  # fmt: skip
     """Strokes for a photo in linear light (h, w, 3), in drawing order.
 
-    observe(strokes, shape) draws further strokes on the open sheet and returns what it shows now, as linear
-    light on a grid of `shape`: the generator steps back and looks before each coat.
+    draw(strokes) draws further strokes on the open sheet; look(shape) returns what it shows now, as linear light
+    on a grid of `shape`: the generator steps back and looks before each coat.
     """
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
@@ -41,11 +42,10 @@ def generate(
         boldest = float(np.percentile(np.linalg.norm(scene.lab - oklab(swatches.paper), axis=2), 95))
         stages = [lambda now, coat=coat: _coat(plan, now, _finer(coat, boldest), style, rng) for coat in style.passes]
         lines = [lambda now: contours.outlines(plan, now, style, rng)]
-        now = observe([], plan.group.shape)
         for stage in lines * style.lines_first + stages + lines:
-            fresh = hand.within(stage(now), width_mm, height_mm)
+            fresh = hand.within(stage(look(plan.group.shape)), width_mm, height_mm)
+            draw(fresh)
             strokes += fresh
-            now = observe(fresh, plan.group.shape)
     return strokes
 
 

@@ -32,10 +32,15 @@ class FlatSheet:
         self.size_mm, self.table = np.array([width_mm, height_mm]), table or box()
         self.light: np.ndarray | None = None
 
-    def observe(self, strokes, shape):
-        """Draw strokes and return linear light (h, w, 3), as `generate` asks for."""
+    def look(self, shape):
+        """Linear light (h, w, 3), as `generate` asks for; the first look says how fine the sheet is."""
         if self.light is None:
             self.light = np.tile(self.table.paper, (*shape, 1)).astype(np.float32)
+        return self.light.copy()
+
+    def draw(self, strokes):
+        """Draw strokes, in order."""
+        shape = self.light.shape[:2]
         scale = np.array(shape[::-1]) / self.size_mm
         for (crayon, width), part in groupby(strokes, lambda s: (s.crayon, s.tip.width_mm)):
             level = np.zeros(shape, np.float32)
@@ -47,4 +52,3 @@ class FlatSheet:
             for c in range(3):
                 a, b = (np.interp(level[drawn], table.pressures, t[k, :, c]) for t in (table.a, table.b))
                 self.light[drawn, c] = a * self.light[drawn, c] + b
-        return self.light.copy()

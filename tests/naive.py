@@ -162,6 +162,12 @@ def under_tip(columns, mask, top, left, firm=1.0):
     }
 
 
+def throw(number: int) -> int:
+    """0, 1 or 2, as if thrown."""
+    word = number * 2654435761 % 2**32
+    return (word ^ word >> 15) * 2654435761 % 2**32 // 2**16 % 3
+
+
 def contacts(points, stride):
     """Where a stroke touches: x, y, force and direction half a stride from its start and at every stride on."""
     ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
@@ -199,7 +205,7 @@ def rub(columns, points, mask, wax, step, smears, constants, per_lambda, optics,
         own = {}
         if smears:
             own = smear(columns, over, tops, direction, wax, 1 - (1 - nu) ** stride, alpha, beta, optics,
-                        max(1, reach - n % 3))  # fmt: skip
+                        max(1, reach - throw(n)))  # fmt: skip
         worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
         given += deposit(columns, over, tops, direction, own, worn, push if push > 0 else force,
                          rate * stride, film, mu_paper, mu_wax, relief, wear, heap)  # fmt: skip

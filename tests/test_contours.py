@@ -39,7 +39,7 @@ def steady(**changes):
 def outlines(photo, style, seed=0, table=None):
     table = table or box()
     sheet = FlatSheet(WIDTH, HEIGHT, table)
-    strokes = generate(photo, WIDTH, HEIGHT, table, style, seed, observe=sheet.observe, threads=2)
+    strokes = generate(photo, WIDTH, HEIGHT, table, style, seed, draw=sheet.draw, look=sheet.look, threads=2)
     return [s for s in strokes if s.note == "line"]
 
 
@@ -92,7 +92,7 @@ def test_child_closes_its_outlines():
 def test_child_draws_outlines_first_and_last():
     table, style = box(), load_style("child")
     sheet = FlatSheet(WIDTH, HEIGHT, table)
-    strokes = generate(disc(), WIDTH, HEIGHT, table, style, 0, observe=sheet.observe, threads=2)
+    strokes = generate(disc(), WIDTH, HEIGHT, table, style, 0, draw=sheet.draw, look=sheet.look, threads=2)
     notes = [s.note for s in strokes]
     assert notes[0] == notes[-1] == "line" and set(notes) > {"line"}
 

@@ -79,12 +79,16 @@ def strokes_for(photo, style="artist", seed=0, table=TABLE, threads=2, **options
     style = load_style(style) if isinstance(style, str) else style
     width, height = sheet_mm(photo)
     sheet = FlatSheet(width, height, table)
-    return generate(photo, width, height, table, style, seed, observe=sheet.observe, threads=threads, **options)
+    hand = {"draw": sheet.draw, "look": sheet.look}
+    return generate(photo, width, height, table, style, seed, threads=threads, **hand, **options)
 
 
 def shown(photo, strokes, table=TABLE):
     """What strokes show on a flat sheet."""
-    return FlatSheet(*sheet_mm(photo), table).observe(strokes, (90, 120))
+    sheet = FlatSheet(*sheet_mm(photo), table)
+    sheet.look((90, 120))
+    sheet.draw(strokes)
+    return sheet.look((90, 120))
 
 
 def checked(strokes, photo):

@@ -459,6 +459,19 @@ def test_wax_is_smeared_equally_far_at_any_resolution(bench):
     assert np.ptp(spread) < 0.25 * np.mean(spread)
 
 
+def test_a_long_stroke_has_no_rhythm(bench):
+    cell_mm, ways = 0.08, np.arange(2, 40, 2)
+    sheet = bench.felt(round(42 / cell_mm), round(120 / cell_mm), cell_mm)
+    bench.draw(sheet, [bench.stroke([[2, y], [118, y]], 8.0) for y in ways], threads=2)
+    film = sheet.film_um()[:, round(5 / cell_mm) : round(115 / cell_mm)].reshape(sheet.rows, -1)
+    lines = [film[round((y - 0.6) / cell_mm) : round((y + 0.6) / cell_mm)].mean(0) for y in ways]
+    power = sum(np.abs(np.fft.rfft((line - line.mean()) * np.hanning(line.size))) ** 2 for line in lines)
+    stride = rub.STEP * (2 * np.ceil(0.8 / cell_mm) + 1) * cell_mm
+    for contacts in (2, 3, 4, 5):
+        at = round(film.shape[1] * cell_mm / (contacts * stride))
+        assert power[at - 2 : at + 3].mean() < 2 * np.median(power[at - 25 : at + 26])
+
+
 def test_a_dab_gives_the_same_volume_at_any_resolution(bench):
     volumes = []
     for cell_mm in (0.2, 0.1, 0.05):

@@ -282,8 +282,7 @@ def finish(
     if out is not None:
         dpi = easel.sheet.cols / drawing.width_mm * _MM_PER_INCH
         told = notes(drawing, settings) | {"light": light, "smears": easel.smears}
-        write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None, kept=kept,
-                    threads=easel.threads)  # fmt: skip
+        write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None, kept=kept)
     if strokes is not None:
         if Path(strokes).suffix.lower() == ".svg":
             from .svg_out import save_svg
@@ -323,12 +322,15 @@ def workshop() -> ModuleType:
 
 
 def warm_up() -> None:
-    """Draw a narrow strip in every style, and so through every kernel, that all are compiled and kept."""
+    """Draw a narrow strip in every style, film it, open a live sheet: through all kernels, that they are kept."""
     import tempfile
 
     import numpy as np
 
+    from stroke_gen.drawing import Drawing
     from stroke_gen.params import style_names
+
+    from .live import Live
 
     y, x = np.mgrid[:8, :64] / np.float32(8)
     strip = np.stack([x / 8, y, 0.5 + 0.5 * np.sin(2 * x * y)], axis=-1)
@@ -337,3 +339,4 @@ def warm_up() -> None:
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film.png"
         convert(strip, size=400, sheet_mm=100.0, preview=True, light=False, timelapse=film, seconds=3)
+    Live(Drawing(10.0, 10.0, "drawing", "box24", ()), 50)

@@ -122,10 +122,10 @@ def _convert(words: Sequence[str]) -> int:
     if options.out is not None:
         _spare_photo(options.out)
     settings = page.fitted_to(settings, options.print, options.dpi, photo)
-    kept = metadata.kept_of(photo, options.metadata)
     with _talk(options) as progress:
         with api.filming(options.timelapse, options.seconds, options.show_tip, options.light) as watch:
             drawing, easel = api.sketch(options.photo, settings, progress, watch)
+        kept = metadata.kept_of(photo, options.metadata)
         api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings, kept=kept,
                    legend=options.legend)  # fmt: skip
     if options.verbose or (options.out is None and not options.quiet):

@@ -438,11 +438,22 @@ def _press(w, mask, side, cols):  # type: ignore[no-untyped-def]
     return present
 
 
+@inner_kernel
+def _throw(number):  # type: ignore[no-untyped-def]
+    """0, 1 or 2 for each contact, in no order (Knuth's multiplicative hash, twice).
+
+    Wax that always went equally far would part the cells into lattices; a pattern would show as a ladder.
+    """
+    once = (number * 2654435761) & 0xFFFFFFFF
+    twice = ((once ^ (once >> 15)) * 2654435761) & 0xFFFFFFFF
+    return (twice >> 16) % 3
+
+
 @lean_kernel
 def _contact(w, wax, side, reach, present, x, y, force, vx, vy, stride, smears, constants, per_lambda,  # type: ignore[no-untyped-def]
              rows, cols, columns):  # fmt: skip
     """One contact, for `stride` cells of the way: adjust the height, smear, deposit (Fig. 3); returns the wax given."""
-    hop = max(1, reach - np.int64(w.hand[CONTACTS]) % 3)  # one length only would part the cells into lattices
+    hop = max(1, reach - _throw(np.int64(w.hand[CONTACTS])))
     w.hand[CONTACTS] += 1
     if force <= 0:
         return np.float32(0)
@@ -513,7 +524,7 @@ def _rub(picked, points, first, wax_of, mask_of, masks, sides, reach, step, smea
 
     points (n, 3): x, y in cells, force in N; first (strokes + 1): where each stroke's points begin; masks
     (tips, cells): masks with a border of `reach` ABSENT cells, `sides` long; loss (strokes,): wax given.
-    Smeared wax goes `reach` cells at one contact, one and two fewer at the next ones, at least one.
+    Smeared wax goes `reach` cells at a contact, or one or two fewer, at least one.
     """
     for s in picked:
         side, wax = sides[mask_of[s]], np.uint8(wax_of[s])

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageCms, PngImagePlugin
 
-from . import png
 from .image_read import open_picture, shown
 from .image_scan import exif_tag
 from .metadata import flat
@@ -37,19 +36,18 @@ def write_image(
     dpi: float | None = None,
     quality: int = 95,
     kept: Image.Exif | None = None,
-    threads: int | None = None,
 ) -> None:
     """Write a picture so that its name never stands for half a file: the old one, the new one, or none.
 
     path: PNG, JPEG, WebP or TIFF by its suffix; a link is replaced, never written through.
     srgb8: uint8 (h, w, 3), sRGB-encoded. settings: stored inside, see read_settings. dpi: pixels per inch on
-    paper. quality: 1..100, of JPEG and WebP. kept: tags of the photo, see metadata.py. threads: for a PNG, at most
-    so many (all cores). The sRGB profile goes in, no time does.
+    paper. quality: 1..100, of JPEG and WebP. kept: tags of the photo, see metadata.py.
+    The sRGB profile goes in, no time does.
     ValueError for what the caller can mend; OSError with the path if the disk is full or refuses.
     """
     target, format_ = Path(os.fsdecode(path)), file_format(path)
     _check_target(target)
-    data = _encode(srgb8, format_, shown(path), settings or {}, dpi, quality, kept, threads)
+    data = _encode(srgb8, format_, shown(path), settings or {}, dpi, quality, kept)
     try:
         _put(target, data)
     except OSError as error:
@@ -110,7 +108,7 @@ def _check_target(target: Path) -> None:
 
 def _encode(
     srgb8: NDArray[np.uint8], format_: str, name: str, settings: Settings, dpi: float | None, quality: int,
-    kept: Image.Exif | None, threads: int | None,
+    kept: Image.Exif | None,
 ) -> BytesIO:  # fmt: skip
     """The whole file in memory, where no full disk can hurt it."""
     if srgb8.dtype != np.uint8 or srgb8.ndim != 3 or srgb8.shape[2] != 3 or srgb8.size == 0:
@@ -132,10 +130,10 @@ def _encode(
         raise ValueError(f"{name}: settings: {error}; they must be text or finite numbers") from error
     data, options = BytesIO(), _options(format_, text, dpi, quality, kept)
     try:
-        Image.fromarray(srgb8[:1, :1] if format_ == "PNG" else srgb8).save(data, format_, **options)
+        Image.fromarray(srgb8).save(data, format_, **options)
     except ValueError as error:
         raise ValueError(f"{name}: cannot be written as {format_}: {error}") from error
-    return png.with_picture(data.getvalue(), srgb8, threads) if format_ == "PNG" else data
+    return data
 
 
 def _options(
@@ -144,6 +142,7 @@ def _options(
     """What Pillow's writer of each format is to be told. text: the settings as JSON (ASCII)."""
     options: dict[str, Any] = {"icc_profile": _srgb_profile()}
     if format_ == "PNG":
+        options["compress_level"] = 1  # grain hardly packs: more takes far longer and saves little
         options["pnginfo"] = notes = PngImagePlugin.PngInfo()
         notes.add_text("Software", SOFTWARE)
         if text is not None:

@@ -131,16 +131,14 @@ def sketch(
     stages = len(style.passes) + 1 + style.lines_first
     done = 0
 
-    def observe(strokes: list[Stroke], shape: tuple[int, int]) -> NDArray[np.float32]:
+    def draw(strokes: list[Stroke]) -> None:
         nonlocal done
         if strokes:
-            base = done / stages
-            name = strokes[0].note
+            base, name = done / stages, strokes[0].note
             stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
         done += 1
-        return stand.seen(shape)
 
-    strokes = generate(photo, width_mm, height_mm, table, style, settings.seed, observe=observe,
+    strokes = generate(photo, width_mm, height_mm, table, style, settings.seed, draw=draw, look=stand.seen,
                        threads=stand.threads, focus=settings.focus)  # fmt: skip
     drawing = Drawing(
         width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed

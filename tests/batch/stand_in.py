@@ -26,7 +26,7 @@ def sketch(source: str, settings: Settings) -> tuple[Drawing, Any]:
     act(Path(source))
     picture = encode_srgb(photo)
     sheet = SimpleNamespace(cols=cols)
-    easel = SimpleNamespace(picture_srgb=lambda light: picture, sheet=sheet, smears=True, threads=1)
+    easel = SimpleNamespace(picture_srgb=lambda light: picture, sheet=sheet, smears=True)
     return Drawing(cols / 10, rows / 10, "drawing", settings.palette, (), seed=settings.seed), easel
 
 
