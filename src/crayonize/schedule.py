@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stroke_gen.jit import kernel
 
-TILE = 32  # cells
+TILE = 16  # cells
 LEAST_WORK = 20_000.0  # cell-steps: smaller strokes are handed to a thread several at once
 
 
@@ -104,6 +104,7 @@ class _Crew:
         self.left = len(self.waits)
         self.failure: BaseException | None = None
         self.change = threading.Condition()
+        self.over = threading.Event()
 
     def work(self) -> None:
         """What each thread does until nothing is left."""
@@ -112,14 +113,8 @@ class _Crew:
                 self.draw(np.array(picked, np.int64))
             except BaseException as error:
                 self.failure = error
-            with self.change:
-                for s in picked:
-                    for heir in self.heirs[self.first[s] : self.first[s + 1]]:
-                        self.waits[heir] -= 1
-                        if self.waits[heir] == 0:
-                            heapq.heappush(self.ready, heir)
-                self.left -= len(picked)
-                self.change.notify_all()
+            self._release(picked)
+        self.over.set()
 
     def _pick(self) -> list[int]:
         """Strokes to draw next: one, or several small ones; none when all is done or something failed."""
@@ -134,6 +129,20 @@ class _Crew:
                 picked.append(heapq.heappop(self.ready))
                 work += self.cost[picked[-1]]
             return picked
+
+    def _release(self, picked: list[int]) -> None:
+        """Let those go that have waited for strokes just drawn, and call no more threads than they can use."""
+        with self.change:
+            for s in picked:
+                for heir in self.heirs[self.first[s] : self.first[s + 1]]:
+                    self.waits[heir] -= 1
+                    if self.waits[heir] == 0:
+                        heapq.heappush(self.ready, heir)
+            self.left -= len(picked)
+            if self.left and not self.failure:
+                self.change.notify(len(self.ready) - 1)  # this one goes on itself
+            else:
+                self.change.notify_all()
 
 
 def run(
@@ -152,12 +161,12 @@ def run(
     for hand in hands:
         hand.start()
     try:
-        with crew.change:
-            while crew.left and not crew.failure:
-                progress(len(crew.waits) - crew.left)
-                crew.change.wait(0.1)
+        while not crew.over.wait(0.1):
+            progress(len(crew.waits) - crew.left)
     except BaseException as error:
-        crew.failure = error
+        with crew.change:
+            crew.failure = error
+            crew.change.notify_all()
     for hand in hands:
         hand.join()
     if crew.failure:
