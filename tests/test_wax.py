@@ -500,7 +500,11 @@ def test_wear_goes_on_from_stroke_to_stroke(bench):
     box = rub.Box(bench.palette, bench.physics, 0.1)
     stroke = bench.stroke([[2, 2], [30, 2]], 5.0, tip=Tip("sharp", 2.4))
     per_stroke = rub.SHARPEN_UM / 10 * np.pi / 4 * 2.4**2 / rub.worn_per_newton_mm(bench.physics)  # newton mm
-    taken = [box.take(stroke, per_stroke, 0) for _ in range(20)]
+    once, ahead = np.array([per_stroke]), np.array([0])
+    taken = [int(box.take([stroke], once, ahead)[0]) for _ in range(20)]
+    at_once = rub.Box(bench.palette, bench.physics, 0.1)
+    assert at_once.take([stroke] * 20, once.repeat(20), ahead.repeat(20)).tolist() == taken
+    assert at_once.worn_um == box.worn_um
     assert len(set(taken[:10])) == rub.WEAR_LEVELS
     assert taken[:10] == sorted(taken[:10])
     heights = [np.mean(m[m < ABSENT]) for m in box.masks]
@@ -508,7 +512,7 @@ def test_wear_goes_on_from_stroke_to_stroke(bench):
     assert heights[rub.WEAR_LEVELS] > heights[rub.WEAR_LEVELS - 1]  # then turned to a fresh face
     other = bench.stroke([[2, 2], [30, 2]], 5.0, "blue", Tip("sharp", 2.4))
     assert box.worn_um.keys() == {("red", stroke.tip)}
-    box.take(other, per_stroke, 0)
+    box.take([other], once, ahead)
     assert len(box.worn_um) == 2
 
 

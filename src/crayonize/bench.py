@@ -35,7 +35,7 @@ CELL_MM = 297 / 1600  # of all sheets: larger pictures are drawn on larger sheet
 TIP_CELLS = 24
 FORCE_N_MM2 = 0.38  # a firm stroke
 LIVE_SIZES = (1600, 3508)  # A4 as usual, and at 300 dpi
-STAGES = ("reading", "paper", "planning", "simulation", "rendering", "writing")
+STAGES = ("reading", "paper", "planning", "simulation", "looking", "rendering", "writing")
 
 Figures = dict[str, Any]
 
@@ -281,7 +281,7 @@ class _Clock:
     def open(self, easel: "Easel") -> None:
         """The paper is made; all that is not done by the easel from now on is planning."""
         self._turn("planning")
-        for name, stage in (("draw", "simulation"), ("seen", "rendering"), ("picture_srgb", "rendering")):
+        for name, stage in (("draw", "simulation"), ("seen", "looking"), ("picture_srgb", "rendering")):
             setattr(easel, name, self._timed(stage, getattr(easel, name)))
 
     def strokes(self, strokes: "Sequence[Stroke]", share: float) -> "rub.Watch":

@@ -169,8 +169,8 @@ class _Hand:
         """Choose the tip for the way the stroke has begun, and press it on the sheet."""
         box, cell_mm = self.easel.box, self.easel.sheet.cell_mm
         stroke = self.stroke()
-        self._heading = int(_headings(*_points([stroke], cell_mm))[0])
-        mask = box.masks[box.take(stroke, 0.0, self._heading)]
+        self._heading = _headings(*_points([stroke], cell_mm))
+        mask = box.masks[box.take([stroke], np.zeros(1), self._heading)[0]]
         desk = window(mask.size, len(box.palette.crayons))
         self.side = mask.shape[0]
         present = _press(desk, mask.ravel(), self.side, self.easel.sheet.cols)
@@ -187,8 +187,8 @@ class _Hand:
     def _book(self) -> None:
         """Carry the stroke's wear on, and count its wax, as `rub` does."""
         box, cell_mm, stroke = self.easel.box, self.easel.sheet.cell_mm, self.stroke()
-        newton_cells = _work(*_points([stroke], cell_mm))[0][0]
-        box.take(stroke, newton_cells * cell_mm, self._heading)
+        newton_cells, _ = _work(*_points([stroke], cell_mm))
+        box.take([stroke], newton_cells * cell_mm, self._heading)
         box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + self._given * cell_mm**2 / 1000
 
 

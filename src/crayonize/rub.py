@@ -55,19 +55,33 @@ class Box:
         self._fresh: dict[tuple[Tip, int, int], NDArray[np.float32]] = {}
         self.masks: list[NDArray[np.float32]] = []
 
-    def take(self, stroke: Stroke, newton_mm: float, heading: int) -> int:
-        """Which of `masks` draws this stroke along one of HEADINGS; carries the wear on by force times length."""
-        key = (stroke.crayon, stroke.tip)
-        worn = self.worn_um.get(key, 0.0)
-        area_mm2 = 0.785 * stroke.tip.width_mm**2
-        self.worn_um[key] = worn + worn_per_newton_mm(self.constants) * newton_mm / area_mm2
-        face, rest = divmod(worn, SHARPEN_UM)
-        face = (int(face) + len(stroke.crayon)) % FACES
-        shape = (stroke.tip, face, int(rest / SHARPEN_UM * WEAR_LEVELS), heading)
-        if shape not in self._index:
-            self.masks.append(self._mask(*shape))
-            self._index[shape] = len(self.masks) - 1
-        return self._index[shape]
+    def take(
+        self, strokes: Sequence[Stroke], newton_mm: NDArray[np.float64], heading: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Which of `masks` draws each stroke along one of HEADINGS; carries the wear on by force times length."""
+        taken = np.empty(len(strokes), np.int64)
+        ends: dict[tuple[str, Tip], list[int]] = {}
+        for i, stroke in enumerate(strokes):
+            ends.setdefault((stroke.crayon, stroke.tip), []).append(i)
+        for (crayon, shape), mine in ends.items():
+            per_newton_mm = worn_per_newton_mm(self.constants) / (0.785 * shape.width_mm**2)
+            so_far = self.worn_um.get((crayon, shape), 0.0)
+            worn = np.add.accumulate(np.append(so_far, per_newton_mm * newton_mm[mine]))
+            self.worn_um[crayon, shape] = float(worn[-1])
+            face, rest = np.divmod(worn[:-1], SHARPEN_UM)
+            level = (rest / SHARPEN_UM * WEAR_LEVELS).astype(np.int64)
+            looks = np.stack([(face.astype(np.int64) + len(crayon)) % FACES, level, heading[mine]], 1)
+            kinds, which = np.unique(looks, axis=0, return_inverse=True)
+            masks = np.array([self._number(shape, *kind) for kind in kinds.tolist()])
+            taken[mine] = masks[which.ravel()]
+        return taken
+
+    def _number(self, shape: Tip, face: int, level: int, heading: int) -> int:
+        key = (shape, face, level, heading)
+        if key not in self._index:
+            self.masks.append(self._mask(*key))
+            self._index[key] = len(self.masks) - 1
+        return self._index[key]
 
     def _mask(self, shape: Tip, face: int, level: int, heading: int) -> NDArray[np.float32]:
         key = (shape, face, heading)
@@ -111,9 +125,9 @@ def rub(
         return 0.0
     points, first = _points(strokes, sheet.cell_mm)
     forces, cells = _work(points, first)
-    wax_of = np.array([box.palette.index(s.crayon) for s in strokes], np.int64)
-    work = zip(strokes, forces * sheet.cell_mm, _headings(points, first), strict=True)
-    mask_of = np.array([box.take(stroke, newton_mm, heading) for stroke, newton_mm, heading in work], np.int64)
+    place = {name: box.palette.index(name) for name in {s.crayon for s in strokes}}
+    wax_of = np.array([place[s.crayon] for s in strokes], np.int64)
+    mask_of = box.take(strokes, forces * sheet.cell_mm, _headings(points, first))
     masks, sides = box.stacked()
     side_of = sides[mask_of]
     reach = (side_of / 2 + 2).astype(np.float32)
