@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stroke_gen.jit import kernel
 
 TILE = 16  # cells
-LEAST_WORK = 20_000.0  # cell-steps: smaller strokes are handed to a thread several at once
+LEAST_WORK = 6_000.0  # cell-steps: smaller strokes are handed to a thread several at once
 
 
 @dataclass(frozen=True, eq=False)
