@@ -37,7 +37,10 @@ def lean_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def inner_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """As `lean_kernel`, to become part of the kernels that call it."""
+    """As `lean_kernel`, for a small one in an inner loop: it becomes part of the kernels that call it.
+
+    Larger ones would take the compiler long, and be no faster.
+    """
     return _lean(function, inline="always")
 
 

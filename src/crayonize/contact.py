@@ -176,7 +176,7 @@ def _add(cell, wax, height, thin, columns):  # type: ignore[no-untyped-def]
     count[cell] = n + 1
 
 
-@inner_kernel
+@lean_kernel
 def _lay(w, slot, home, thin, columns):  # type: ignore[no-untyped-def]
     """Lay what arrived in one slot."""
     plane, wax, touched = _whole(slot * w.film.size), w.crayon_of[slot], 0
@@ -188,7 +188,7 @@ def _lay(w, slot, home, thin, columns):  # type: ignore[no-untyped-def]
         _add(_whole(home + w.where[at]), wax, w.arriving[plane + at], thin, columns)
 
 
-@inner_kernel
+@lean_kernel
 def _settle(w, slots, home, thin, columns):  # type: ignore[no-untyped-def]
     """Lay what arrived in all slots, of the crayon in hand last."""
     for turn in range(1, slots + 1):
@@ -220,7 +220,7 @@ def _take(w, cells, slots, at, cell, left, scale, columns):  # type: ignore[no-u
     return left, slots
 
 
-@inner_kernel
+@lean_kernel
 def _open(w, cells, slot, wax, begin):  # type: ignore[no-untyped-def]
     """Give a crayon the next slot, empty."""
     w.slot_of[wax] = slot
@@ -255,7 +255,7 @@ def _take_blend(w, side, reach, at, cell, left, scale, blend):  # type: ignore[n
 # ---- the steps of Fig. 3 -----------------------------------------------------------------------------------
 
 
-@inner_kernel
+@lean_kernel
 def _look(w, side, present, top, left, rows, cols, firm, columns):  # type: ignore[no-untyped-def]
     """Surface, film and gap under the window; returns which share of the tip is on the sheet."""
     paper, total = columns[0], columns[1]
@@ -287,7 +287,7 @@ def _look(w, side, present, top, left, rows, cols, firm, columns):  # type: igno
     return np.float32(inside) / np.float32(present)
 
 
-@inner_kernel
+@lean_kernel
 def _balance(gap, wanted, start, epsilon):  # type: ignore[no-untyped-def]
     """Height of the tip at which the overlaps sum to `wanted` (Fig. 4). `start`: the last height.
 
@@ -325,7 +325,7 @@ def _step(k, side, reach):  # type: ignore[no-untyped-def]
     return (dy * side + dx) * reach
 
 
-@inner_kernel
+@lean_kernel
 def _weigh(w, side, reach, vx, vy, alpha, beta):  # type: ignore[no-untyped-def]
     """How strongly each cell is drawn to each of its neighbours (Eq. 4); those off the sheet stand too high."""
     size, edge = w.film.size, reach * side + reach
@@ -341,7 +341,7 @@ def _weigh(w, side, reach, vx, vy, alpha, beta):  # type: ignore[no-untyped-def]
               w.weight[plane + edge : plane + end], w.weights[edge:end])  # fmt: skip
 
 
-@inner_kernel
+@lean_kernel
 def _smear(w, side, reach, home, nu, columns):  # type: ignore[no-untyped-def]
     """Push standing wax to the eight neighbours (Fig. 7); all amounts come from one snapshot.
 
@@ -383,7 +383,7 @@ def _smear(w, side, reach, home, nu, columns):  # type: ignore[no-untyped-def]
     return slots
 
 
-@inner_kernel
+@lean_kernel
 def _blend_in(w, begin, end, home, total, blend):  # type: ignore[no-untyped-def]
     """Let the blend that was taken arrive."""
     for at in range(begin, end):
@@ -396,7 +396,7 @@ def _blend_in(w, begin, end, home, total, blend):  # type: ignore[no-untyped-def
                 w.blended[at * BLEND + c] = 0
 
 
-@inner_kernel
+@lean_kernel
 def _deposit(w, side, reach, vx, vy, push, rate, thick, mu_paper, mu_wax, relief, wear, heap):  # type: ignore[no-untyped-def]
     """Rub wax off the tip by friction (Eq. 3, Fig. 6).
 
@@ -422,7 +422,7 @@ def _deposit(w, side, reach, vx, vy, push, rate, thick, mu_paper, mu_wax, relief
 # ---- strokes -----------------------------------------------------------------------------------------------
 
 
-@inner_kernel
+@lean_kernel
 def _press(w, mask, side, cols):  # type: ignore[no-untyped-def]
     """Put a tip on a sheet `cols` cells wide: the beginning of a stroke; returns how many cells the tip has."""
     present = 0
@@ -486,7 +486,7 @@ def _contact(w, wax, side, reach, present, x, y, force, vx, vy, stride, smears, 
     return given
 
 
-@inner_kernel
+@lean_kernel
 def _move(w, wax, side, reach, present, a, b, step, smears, constants, per_lambda, rows, cols, columns):  # type: ignore[no-untyped-def]
     """Draw on from point a to point b, each x, y in cells and force: a contact every so many cells; returns the wax.
 
@@ -507,7 +507,7 @@ def _move(w, wax, side, reach, present, a, b, step, smears, constants, per_lambd
     return given
 
 
-@inner_kernel
+@lean_kernel
 def _lift(w, wax, side, reach, present, b, smears, constants, per_lambda, rows, cols, columns):  # type: ignore[no-untyped-def]
     """End a stroke at point b; one so short that nothing touched becomes a dab. Returns the wax given."""
     if w.hand[CONTACTS] > 0:
