@@ -130,6 +130,14 @@ def test_draw_checks_too(tmp_path):
         crayonize.draw(tmp_path / "missing.json")
 
 
+@pytest.mark.parametrize("far", [np.inf, np.nan, 1e30])
+def test_a_drawing_made_by_hand_is_checked_before_it_is_drawn(far):
+    path, force = np.array([[1, 1], [far, 5]], np.float32), np.ones(2, np.float32)
+    drawing = Drawing(20.0, 20.0, "drawing", "box24", (Stroke(path, force, "red", Tip()),))
+    with pytest.raises(ValueError, match="stroke 1"):
+        crayonize.draw(drawing, 60)
+
+
 def test_inputs_are_never_outputs(photo, tmp_path):
     Image.fromarray(photo).save(tmp_path / "photo.png")
     Image.fromarray(photo).save(tmp_path / "paper.png")

@@ -118,6 +118,20 @@ def test_own_pictures_are_written_over_and_others_when_o_names_them(photo, run, 
         assert run(photo, out, "--size", 40, "--preview")[0] == 0
 
 
+def test_a_photo_taken_away_while_it_is_drawn_costs_no_drawing(photo, run, tmp_path, monkeypatch):
+    mine, sketch = tmp_path / "mine.jpg", api.sketch
+    mine.write_bytes(photo.read_bytes())
+
+    def sketch_and_lose(*given):
+        drawn = sketch(*given)
+        mine.unlink()
+        return drawn
+
+    monkeypatch.setattr(api, "sketch", sketch_and_lose)
+    assert run(mine, tmp_path / "out.png", "--size", 40, "--preview")[0] == 0
+    assert (tmp_path / "out.png").exists()
+
+
 def test_saved_strokes_give_the_same_picture(drawn, run):
     folder = drawn[0]
     assert run("draw", folder / "strokes.json", folder / "again.png", "--size", 200) == (0, "", "")

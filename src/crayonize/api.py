@@ -204,12 +204,15 @@ def redraw(
     watch: Watch | None = None,
 ) -> tuple[Drawing, Easel]:
     """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the sheet."""
-    from stroke_gen.drawing import Drawing
+    from stroke_gen.drawing import Drawing, check_drawing
 
     _check_whole("size", size, 1, MAX_SIZE)
     _check_threads(threads)
     check_outputs([drawing], out)
-    drawing = drawing if isinstance(drawing, Drawing) else load_strokes(drawing)
+    if isinstance(drawing, Drawing):
+        check_drawing(drawing, "drawing")
+    else:
+        drawing = load_strokes(drawing)
     check_size(drawing.width_mm, drawing.height_mm, size, preview, filmed=watch is not None)
     easel: Easel = workshop().draw(drawing, size, threads=threads, preview=preview, progress=progress,
                                    watch=watch)  # fmt: skip

@@ -54,7 +54,6 @@ class Live:
 
         size: of the picture's long side in pixels.   light: shade the relief.   threads: for those first strokes.
         """
-        check_drawing(drawing, "drawing")
         _, self.easel = api.redraw(drawing, size, threads)
         self.light = light
         self._drawing, self._strokes = drawing, list(drawing.strokes)

@@ -7,6 +7,7 @@ the drawing. Where the photo was taken is left out unless everything is wanted.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -54,11 +55,12 @@ def kept(picture: Image, which: str) -> Exif | None:
 
 
 def kept_of(photo: str | os.PathLike[str], which: str) -> Exif | None:
-    """As `kept`, for a photo file."""
+    """As `kept`, for a photo file; None too if the file is gone by now, for its drawing must not be lost with it."""
     from .image_read import open_picture
 
-    with open_picture(photo) as (picture, _):
+    with suppress(OSError, ValueError), open_picture(photo) as (picture, _):
         return kept(picture, which)
+    return None
 
 
 def flat(exif: Exif) -> Exif:
