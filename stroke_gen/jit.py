@@ -3,6 +3,9 @@
 A kernel calls only kernels of its own file and takes every constant as an argument: numba's disk
 cache does not notice a change in another file. Where the cache may live is decided before this
 module is imported, by the environment variable NUMBA_CACHE_DIR; CRAYONIZE_NO_CACHE turns it off.
+
+Kernels write their sums and minima out as loops: to load one that calls an array's `min` or `mean`, numba first
+imports half of itself and scipy, a quarter of a second.
 """
 
 import os

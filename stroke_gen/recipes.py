@@ -88,7 +88,10 @@ def _costs(sample, a, b, grain, paper, heavy, pairs, extra, to_lms, to_lab, grai
                 for i in range(n):
                     dl, da, db = lightness - sample[g, 0, i], red - sample[g, 1, i], yellow - sample[g, 2, i]
                     least[i] = min(least[i], np.sqrt(dl * dl + da * da + db * db) + dear)
-            cost[g, q] = least.mean()
+            total = np.float32(0)
+            for i in range(n):
+                total += least[i]
+            cost[g, q] = total / n
 
 
 def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random.Generator) -> Recipes:

@@ -73,7 +73,9 @@ def _gain(top, left, current, lab, need, a, b, grain, to_lms, to_lab, tone, dark
 
     a, b and grain have a row for each pressure.
     """
-    number = np.count_nonzero(need)
+    number = 0
+    for asked in need.flat:
+        number += asked != 0
     light, target = np.empty((3, number), np.float32), np.empty((3, number), np.float32)
     i = 0
     for y in range(need.shape[0]):
@@ -155,10 +157,11 @@ def _base(top, bottom, lab, group, colour, price, choices, log_p, sharp, out):  
             g = group[y, x]
             number = choices[g]
             l0, a0, b0 = lab[y, x]
+            least = np.float32(np.inf)
             for m in range(number):
                 dl, da, db = colour[g, 0, m] - l0, colour[g, 1, m] - a0, colour[g, 2, m] - b0
                 cost[m] = np.sqrt(dl * dl + da * da + db * db) + price[g, m]
-            least = cost[:number].min()
+                least = min(least, cost[m])
             each = number // log_p.size
             total, mean = np.float32(0), np.float32(0)
             for m in range(number):

@@ -1,6 +1,7 @@
 """Scheduling: strokes of one level never meet, order is kept, and the work is shared out whole."""
 
 import threading
+import time
 
 import naive
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from crayonize import schedule
 from stroke_gen.drawing import Tip
+from stroke_gen.jit import lean_kernel
 
 
 def packed(paths):
@@ -106,23 +108,35 @@ def test_no_cell_beyond_the_reach_is_changed(bench, monkeypatch, kind):
         assert max(rows.max() + 1 - 10 * y, 10 * y - rows.min()) <= reaches[-1]
 
 
+def one_by_one(see):
+    """What `schedule.run` calls, drawing one stroke at a time: `see` it, and no more."""
+
+    def draw(queue, done):
+        taken = schedule.take(queue, done)
+        if taken >= 0:
+            see(taken)
+        return taken
+
+    return draw
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3, 8])
 def test_every_stroke_is_drawn_once_and_after_those_it_waits_for(threads):
     rng = np.random.default_rng(4)
     points, first = packed(random_paths(rng, 300, 900))
     order = schedule.order(points, first, np.full(300, 5, np.float32), 900, 900)
+    before = [{p for p in range(300) if s in order.heirs[order.first[p] : order.first[p + 1]]} for s in range(300)]
     lock, done, reported = threading.Lock(), [], []
 
-    def draw(picked):
+    def see(stroke):
         with lock:
-            for s in picked:
-                before = [p for p in range(300) if s in order.heirs[order.first[p] : order.first[p + 1]]]
-                assert set(before) <= set(done)
-                done.append(int(s))
+            assert before[stroke] <= set(done)
+            done.append(stroke)
 
-    schedule.run(draw, order, rng.exponential(1e4, 300), threads, reported.append)
+    schedule.run(one_by_one(see), order, threads, reported.append)
     assert sorted(done) == list(range(300))
     assert reported == sorted(reported) and reported[-1] == 300
+    assert threads > 1 or done == sorted(done)  # the earliest first
 
 
 def test_a_failure_in_a_thread_is_raised_and_ends_the_work():
@@ -130,11 +144,61 @@ def test_a_failure_in_a_thread_is_raised_and_ends_the_work():
     order = schedule.order(points, first, np.full(50, 5, np.float32), 64, 64)
     drawn = []
 
-    def draw(picked):
-        drawn.extend(picked)
+    def see(stroke):
+        drawn.append(stroke)
         if len(drawn) == 3:
             raise RuntimeError("out of wax")
 
     with pytest.raises(RuntimeError, match="out of wax"):
-        schedule.run(draw, order, np.full(50, 1e9), 4)
+        schedule.run(one_by_one(see), order, 4)
     assert len(drawn) == 3
+
+
+def test_being_interrupted_ends_the_work():
+    points, first = packed([np.array([[5.0, 5.0]])] * 50)
+    order = schedule.order(points, first, np.full(50, 5, np.float32), 64, 64)
+    drawn = []
+
+    def see(stroke):
+        drawn.append(stroke)
+        time.sleep(0.05)
+
+    def progress(done):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        schedule.run(one_by_one(see), order, 4, progress)
+    assert len(drawn) < 10
+
+
+def test_what_is_ready_comes_off_the_heap_in_order():
+    rng = np.random.default_rng(6)
+    heap, held = np.zeros(64, np.int32), []
+    for number in rng.permutation(400):
+        if held and (len(held) == 64 or rng.random() < 0.45):
+            assert schedule._pop(heap, len(held) - 1) == min(held)
+            held.remove(min(held))
+        schedule._push(heap, len(held), number)
+        held.append(number)
+
+
+@pytest.mark.parametrize("threads", [4, 16])
+def test_the_lock_lets_one_thread_in_at_a_time(threads):
+    """Kernels on many threads count up without ever losing a step."""
+
+    @lean_kernel
+    def count(lock, counter, times):
+        for _ in range(times):
+            while schedule.exchange(lock, 0, 1):
+                pass
+            counter[0] += 1
+            schedule.exchange(lock, 0, 0)
+
+    lock, counter = np.zeros(1, np.int32), np.zeros(1, np.int64)
+    count(lock, counter, 1)
+    hands = [threading.Thread(target=count, args=(lock, counter, 20_000)) for _ in range(threads)]
+    for hand in hands:
+        hand.start()
+    for hand in hands:
+        hand.join()
+    assert counter[0] == 20_000 * threads + 1

@@ -3,14 +3,18 @@
 import numpy as np
 import pytest
 
-from crayonize import tip
+from crayonize import contact, tip
 from stroke_gen.drawing import Tip
 
 KINDS = ("sharp", "blunt", "rim", "side")
 
 
 def made(kind="blunt", width_mm=2.4, cell_mm=0.1, worn_um=0.0, angle_deg=0.0, seed=0):
-    return tip.worn(tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed)), worn_um)
+    mask = tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed))
+    assert len(mask) == tip.side(Tip(kind, width_mm, angle_deg), cell_mm)
+    desk = contact.window(mask.size, 1)
+    contact._press(desk, mask.ravel(), np.float32(worn_um), len(mask), 1000)
+    return desk.mask.reshape(mask.shape)
 
 
 def extent_mm(mask, cell_mm):

@@ -166,13 +166,15 @@ class _Kept:
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The kernel compiled for the argument types `sig`, or None."""
         from numba.core import compiler
+        from numba.core.runtime.nrt import rtsys
 
         rebuild: Any = compiler.CompileResult._rebuild
-        target_context.refresh()
+        rtsys.initialize(target_context)
         content = read(self._path(sig))
         if content is not None:
             with contextlib.suppress(Exception):  # whatever a strange entry may do: it is compiled anew
                 return rebuild(target_context, *pickle.loads(content))
+        target_context.refresh()
         _announce(self._place.parent)
         return None
 

@@ -5,7 +5,7 @@ a window: a square of cells, kept row by row in flat arrays, in which the neighb
 lies equally far on. So weighing, flowing and rubbing off are plain loops over arrays, which the compiler
 turns into vector instructions; only taking wax off columns and laying it on goes cell by cell.
 
-Kernels here get all memory from outside (`window`) and call only each other.
+Kernels here get all memory from outside (`window`); strokes they get from the queue of `schedule`.
 """
 
 from typing import Any, NamedTuple
@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.jit import inner_kernel, lean_kernel, lean_sum_kernel
+
+from .schedule import patient_take
 
 LAYERS = 4  # pure layers a cell
 BLEND = 7  # height, then k*h and s*h for red, green, blue
@@ -423,15 +425,19 @@ def _deposit(w, side, reach, vx, vy, push, rate, thick, mu_paper, mu_wax, relief
 
 
 @lean_kernel
-def _press(w, mask, side, cols):  # type: ignore[no-untyped-def]
-    """Put a tip on a sheet `cols` cells wide: the beginning of a stroke; returns how many cells the tip has."""
+def _press(w, mask, worn, side, cols):  # type: ignore[no-untyped-def]
+    """Put a tip on a sheet `cols` cells wide: the beginning of a stroke; returns how many cells the tip has.
+
+    worn: um of its height that have been rubbed off, which cuts its profile flat from below.
+    """
     present = 0
     for j in range(side):
         for i in range(side):
             at = j * side + i
             w.where[at] = j * cols + i
-            w.mask[at] = mask[at]
-            present += int(mask[at] < np.float32(1e8))
+            there = mask[at] < np.float32(1e8)
+            w.mask[at] = max(mask[at] - worn, np.float32(0)) if there else mask[at]
+            present += int(there)
     w.hand[:] = 0.5
     w.hand[HEIGHT] = 1e9  # lifted: from far below, float32 would miss the paper
     w.hand[WALKED] = w.hand[CONTACTS] = 0
@@ -518,17 +524,20 @@ def _lift(w, wax, side, reach, present, b, smears, constants, per_lambda, rows, 
 
 
 @lean_kernel
-def _rub(picked, points, first, wax_of, mask_of, masks, sides, reach, step, smears, constants, per_lambda,  # type: ignore[no-untyped-def]
-         rows, cols, columns, loss, w):  # fmt: skip
-    """Draw the strokes `picked`, one after another.
+def _rub(queue, done, alone, points, first, wax_of, tip_of, worn_of, masks, sides, reach, step, smears, constants,  # type: ignore[no-untyped-def]
+         per_lambda, rows, cols, columns, loss, w):  # fmt: skip
+    """Draw strokes as the queue gives them out; see `schedule.run`.
 
+    done: a stroke drawn before that the queue is told of; alone: return after one stroke.
     points (n, 3): x, y in cells, force in N; first (strokes + 1): where each stroke's points begin; masks
-    (tips, cells): masks with a border of `reach` ABSENT cells, `sides` long; loss (strokes,): wax given.
+    (tips, cells): fresh masks with a border of `reach` ABSENT cells, `sides` long; tip_of, worn_of (strokes,): which
+    of them, and how much of its height in um is rubbed off; loss (strokes,): wax given.
     Smeared wax goes `reach` cells at a contact, or one or two fewer, at least one.
     """
-    for s in picked:
-        side, wax = sides[mask_of[s]], np.uint8(wax_of[s])
-        present = _press(w, masks[mask_of[s]], side, cols)
+    s = patient_take(queue, done)
+    while s >= 0:
+        side, wax = sides[tip_of[s]], np.uint8(wax_of[s])
+        present = _press(w, masks[tip_of[s]], worn_of[s], side, cols)
         given = 0.0
         for i in range(first[s] + 1, first[s + 1]):
             given += _move(w, wax, side, reach, present, points[i - 1], points[i], step, smears, constants,
@@ -536,3 +545,7 @@ def _rub(picked, points, first, wax_of, mask_of, masks, sides, reach, step, smea
         given += _lift(w, wax, side, reach, present, points[first[s + 1] - 1], smears, constants, per_lambda,
                        rows, cols, columns)  # fmt: skip
         loss[s] = given
+        if alone:
+            break
+        s = patient_take(queue, s)
+    return s

@@ -18,7 +18,7 @@ from . import api, optics
 from .contact import _lift, _move, _press, window
 from .image_color import encode_srgb
 from .pipeline import Easel
-from .rub import STEP, _headings, _points, _work, surroundings
+from .rub import STEP, _points, _ways, surroundings
 from .settings import Settings
 
 SETTLE_MM = 0.5  # length from which a stroke's heading is taken
@@ -150,7 +150,7 @@ class _Hand:
         self._force.append(force)
         if not self.side:
             points, first = _points([self.stroke()], self.easel.sheet.cell_mm)
-            if _work(points, first)[1][0] * self.easel.sheet.cell_mm < SETTLE_MM:
+            if _ways(points, first)[1][0] * self.easel.sheet.cell_mm < SETTLE_MM:
                 return points[:0]
             self._put_down()
         return self._draw()
@@ -168,11 +168,12 @@ class _Hand:
         """Choose the tip for the way the stroke has begun, and press it on the sheet."""
         box, cell_mm = self.easel.box, self.easel.sheet.cell_mm
         stroke = self.stroke()
-        self._heading = _headings(*_points([stroke], cell_mm))
-        mask = box.masks[box.take([stroke], np.zeros(1), self._heading)[0]]
+        *_, self._heading = _ways(*_points([stroke], cell_mm))
+        taken, worn_um = box.take([stroke], np.zeros(1), self._heading)
+        mask = box.masks[taken[0]]
         desk = window(mask.size, len(box.palette.crayons))
         self.side = mask.shape[0]
-        present = _press(desk, mask.ravel(), self.side, self.easel.sheet.cols)
+        present = _press(desk, mask.ravel(), worn_um[0], self.side, self.easel.sheet.cols)
         self._tip = (desk, self._wax, self.side, box.reach, present)
 
     def _draw(self) -> Floats:
@@ -186,7 +187,7 @@ class _Hand:
     def _book(self) -> None:
         """Carry the stroke's wear on, and count its wax, as `rub` does."""
         box, cell_mm, stroke = self.easel.box, self.easel.sheet.cell_mm, self.stroke()
-        newton_cells, _ = _work(*_points([stroke], cell_mm))
+        newton_cells, _, _ = _ways(*_points([stroke], cell_mm))
         box.take([stroke], newton_cells * cell_mm, self._heading)
         box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + self._given * cell_mm**2 / 1000
 

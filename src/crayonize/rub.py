@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.drawing import Stroke, Tip
+from stroke_gen.jit import lean_kernel
 
 from . import schedule, tip
 from .contact import _rub, window
@@ -25,7 +26,7 @@ from .wax import Physics, Sheet
 
 STEP = 0.14  # of the tip's width, between two contacts: below the wavelength of the bumps
 SHARPEN_UM = 36.0  # mean height lost before a tip is turned or sharpened
-WEAR_LEVELS = 3  # masks between sharp and worn
+WEAR_LEVELS = 3  # from fresh to worn
 FACES = 3  # different sets of bumps
 HEADINGS = 9  # directions in which the bumps are drawn out, over half a turn
 
@@ -51,45 +52,46 @@ class Box:
         self.reach = constants.reach(cell_mm)
         self.worn_um: dict[tuple[str, Tip], float] = {}
         self.given_mm3: dict[str, float] = {}
-        self._index: dict[tuple[Tip, int, int, int], int] = {}
-        self._fresh: dict[tuple[Tip, int, int], NDArray[np.float32]] = {}
-        self.masks: list[NDArray[np.float32]] = []
+        self._index: dict[tuple[Tip, int, int], int] = {}
+        self.masks: list[NDArray[np.float32]] = []  # of fresh tips
 
     def take(
         self, strokes: Sequence[Stroke], newton_mm: NDArray[np.float64], heading: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
-        """Which of `masks` draws each stroke along one of HEADINGS; carries the wear on by force times length."""
-        taken = np.empty(len(strokes), np.int64)
-        ends: dict[tuple[str, Tip], list[int]] = {}
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """Which of `masks` draws each stroke along one of HEADINGS, and how many um of it are worn off.
+
+        The wear goes on by force times length.
+        """
+        taken, worn_um = np.empty(len(strokes), np.int64), np.empty(len(strokes), np.float32)
+        shapes = {id(stroke.tip): stroke.tip for stroke in strokes}  # far fewer than strokes, and slow to compare
+        same = {shape: shape for shape in shapes.values()}
+        alike = {key: id(same[shape]) for key, shape in shapes.items()}
+        mine_of: dict[tuple[str, int], list[int]] = {}
         for i, stroke in enumerate(strokes):
-            ends.setdefault((stroke.crayon, stroke.tip), []).append(i)
-        for (crayon, shape), mine in ends.items():
+            mine_of.setdefault((stroke.crayon, alike[id(stroke.tip)]), []).append(i)
+        for (crayon, key), mine in mine_of.items():
+            shape = shapes[key]
             per_newton_mm = worn_per_newton_mm(self.constants) / (0.785 * shape.width_mm**2)
             so_far = self.worn_um.get((crayon, shape), 0.0)
             worn = np.add.accumulate(np.append(so_far, per_newton_mm * newton_mm[mine]))
             self.worn_um[crayon, shape] = float(worn[-1])
             face, rest = np.divmod(worn[:-1], SHARPEN_UM)
-            level = (rest / SHARPEN_UM * WEAR_LEVELS).astype(np.int64)
-            looks = np.stack([(face.astype(np.int64) + len(crayon)) % FACES, level, heading[mine]], 1)
-            kinds, which = np.unique(looks, axis=0, return_inverse=True)
-            masks = np.array([self._number(shape, *kind) for kind in kinds.tolist()])
-            taken[mine] = masks[which.ravel()]
-        return taken
+            worn_um[mine] = np.floor(rest / SHARPEN_UM * WEAR_LEVELS) / WEAR_LEVELS * SHARPEN_UM
+            look = (face.astype(np.int64) + len(crayon)) % FACES * HEADINGS + heading[mine]
+            kinds, which = np.unique(look, return_inverse=True)
+            taken[mine] = np.array([self._number(shape, *divmod(kind, HEADINGS)) for kind in kinds.tolist()])[which]
+        return taken, worn_um
 
-    def _number(self, shape: Tip, face: int, level: int, heading: int) -> int:
-        key = (shape, face, level, heading)
-        if key not in self._index:
-            self.masks.append(self._mask(*key))
-            self._index[key] = len(self.masks) - 1
-        return self._index[key]
-
-    def _mask(self, shape: Tip, face: int, level: int, heading: int) -> NDArray[np.float32]:
+    def _number(self, shape: Tip, face: int, heading: int) -> int:
         key = (shape, face, heading)
-        if key not in self._fresh:
+        if key not in self._index:
             rng = np.random.default_rng([self.seed, 11, face])
-            turned = tip.mask(shape, self.cell_mm, rng, np.pi * heading / HEADINGS)
-            self._fresh[key] = np.pad(turned, self.reach, constant_values=tip.ABSENT)
-        return tip.worn(self._fresh[key], level / WEAR_LEVELS * SHARPEN_UM)
+            turned, edge = tip.mask(shape, self.cell_mm, rng, np.pi * heading / HEADINGS), self.reach
+            mask = np.full((len(turned) + 2 * edge, len(turned) + 2 * edge), tip.ABSENT)
+            mask[edge:-edge, edge:-edge] = turned
+            self._index[key] = len(self.masks)
+            self.masks.append(mask)
+        return self._index[key]
 
     def stacked(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """All masks as rows of one array, and the side of each."""
@@ -124,32 +126,31 @@ def rub(
     if not strokes:
         return 0.0
     points, first = _points(strokes, sheet.cell_mm)
-    forces, cells = _work(points, first)
+    newton_cells, _, heading = _ways(points, first)
     place = {name: box.palette.index(name) for name in {s.crayon for s in strokes}}
     wax_of = np.array([place[s.crayon] for s in strokes], np.int64)
-    mask_of = box.take(strokes, forces * sheet.cell_mm, _headings(points, first))
+    tip_of, worn_of = box.take(strokes, newton_cells * sheet.cell_mm, heading)
     masks, sides = box.stacked()
-    side_of = sides[mask_of]
-    reach = (side_of / 2 + 2).astype(np.float32)
+    reach = (sides[tip_of] / 2 + 2).astype(np.float32)
     order = schedule.order(points, first, reach, sheet.rows, sheet.cols)
     drawn = watch(points, first, reach) if watch else None
-    cost = (cells / np.maximum(1, STEP * (side_of - 2 * box.reach)) + 1) * side_of**2
     loss = np.zeros(len(strokes), np.float64)
     around, desk = surroundings(sheet, box, smears), threading.local()
 
-    def draw(picked: NDArray[np.int64]) -> None:
+    def draw(queue: schedule.Queue, done: int) -> int:
         if not hasattr(desk, "window"):
             desk.window = window(masks.shape[1], len(sheet.optics))
-        _rub(picked, points, first, wax_of, mask_of, masks, sides, box.reach, np.float32(STEP), *around, loss,
-             desk.window)  # fmt: skip
-        if drawn:
-            drawn(picked)
+        last: int = _rub(queue, done, drawn is not None, points, first, wax_of, tip_of, worn_of, masks, sides,
+                         box.reach, np.float32(STEP), *around, loss, desk.window)  # fmt: skip
+        if drawn and last >= 0:
+            drawn(np.array([last]))
+        return last
 
     def report(done: int) -> None:
         if progress:
             progress(done, len(strokes))
 
-    schedule.run(draw, order, cost, threads, report)
+    schedule.run(draw, order, threads, report)
     for stroke, given in zip(strokes, loss * sheet.cell_mm**2 / 1000, strict=True):
         box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + float(given)
     return float(loss.sum())
@@ -166,25 +167,35 @@ def _points(strokes: Sequence[Stroke], cell_mm: float) -> tuple[NDArray[np.float
     first = np.zeros(len(strokes) + 1, np.int64)
     np.cumsum([len(s.path_mm) for s in strokes], out=first[1:])
     points = np.empty((int(first[-1]), 3), np.float32)
-    np.concatenate([s.path_mm for s in strokes], out=points[:, :2])
+    points[:, :2] = np.concatenate([s.path_mm for s in strokes])
     points[:, :2] /= cell_mm
-    np.concatenate([s.force_n for s in strokes], out=points[:, 2])
+    points[:, 2] = np.concatenate([s.force_n for s in strokes])
     return points, first
 
 
-def _work(points: NDArray[np.float32], first: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Of each stroke: force times length (newton cells), and length in cells."""
-    step = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1])).astype(np.float64)
-    step[first[1:-1] - 1] = 0  # from one stroke to the next the crayon is lifted
-    step = np.append(step, 0.0)
-    return np.add.reduceat(step * points[:, 2], first[:-1]), np.add.reduceat(step, first[:-1])
+def _ways(
+    points: NDArray[np.float32], first: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Of each stroke: force times length (newton cells), length in cells, and its mean direction.
+
+    Directions count alike to and fro, and are given as one of HEADINGS.
+    """
+    newton_cells, cells, double = np.zeros((3, len(first) - 1))
+    _measure(points, first, newton_cells, cells, double)
+    return newton_cells, cells, np.round(double / (2 * np.pi) * HEADINGS).astype(np.int64) % HEADINGS
 
 
-def _headings(points: NDArray[np.float32], first: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Mean direction of each stroke, to and fro counting alike, as one of HEADINGS."""
-    step = np.append(np.diff(points[:, :2], axis=0), [[0, 0]], 0).astype(np.float64)
-    step[first[1:-1] - 1] = 0
-    x, y = step.T
-    length = np.maximum(np.hypot(x, y), 1e-9)
-    double = np.add.reduceat(((x * x - y * y) + 2j * x * y) / length, first[:-1])
-    return np.round(np.angle(double) / 2 / np.pi * HEADINGS).astype(np.int64) % HEADINGS
+@lean_kernel
+def _measure(points, first, newton_cells, cells, double):  # type: ignore[no-untyped-def]
+    """Force times length, length, and twice the angle of the mean direction of each stroke."""
+    for s in range(newton_cells.size):
+        along, across = 0.0, 0.0
+        for i in range(first[s], first[s + 1] - 1):
+            dx, dy = np.float64(points[i + 1, 0] - points[i, 0]), np.float64(points[i + 1, 1] - points[i, 1])
+            step = np.sqrt(dx * dx + dy * dy)
+            newton_cells[s] += step * points[i, 2]
+            cells[s] += step
+            if step > 0:
+                along += (dx * dx - dy * dy) / step
+                across += 2 * dx * dy / step
+        double[s] = np.arctan2(across, along)

@@ -6,6 +6,7 @@ every resolution. A little smooth noise stands for the bumps and hollows of real
 long streaks along a stroke.
 """
 
+import functools
 from typing import TYPE_CHECKING
 
 import cv2
@@ -23,30 +24,40 @@ SIDE_MM = 2.6  # breadth of the strip on which a lying crayon touches the paper
 DROPS_UM = {"sharp": 110.0, "blunt": 32.0, "rim": 60.0, "side": 40.0}  # centre to edge
 
 
+def side(tip: "Tip", cell_mm: float) -> int:
+    """How many cells a mask is wide, an odd number."""
+    return 2 * int(np.ceil(_half(tip, cell_mm))) + 1
+
+
 def mask(tip: "Tip", cell_mm: float, rng: np.random.Generator, heading_rad: float = 0.0) -> NDArray[np.float32]:
     """The mask of a fresh tip on a grid of `cell_mm`, with grooves along `heading_rad`, the way it moves.
 
-    Returns (n, n) float32 in um with n odd, the lowest present cell at 0.
+    Returns (n, n) float32 in um with n of `side`, the lowest present cell at 0.
     """
     if tip.kind not in DROPS_UM:
         raise ValueError(f"tip.kind: {tip.kind!r} is none of {', '.join(DROPS_UM)}")
     if not 0 < tip.width_mm <= 100:
         raise ValueError(f"tip.width_mm: {tip.width_mm} is not between 0 and 100")
-    half = max(0.5 * tip.width_mm / cell_mm, 0.75)
-    n = 2 * int(np.ceil(half)) + 1
-    y, x = (np.mgrid[:n, :n] - n // 2) / half
-    angle = np.deg2rad(tip.angle_deg)
-    along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
-    radius = np.hypot(x, y)
-    rise, present = _profile(tip, along, across, radius)
-    present[n // 2, n // 2] |= not present.any()  # finer than a cell
-    height = DROPS_UM[tip.kind] * rise + BUMP_UM * _bumps(n, BUMP_MM / cell_mm, heading_rad, rng)
+    shape, present = _shape(tip, cell_mm)
+    height = shape + BUMP_UM * _bumps(len(shape), _groove(BUMP_MM / cell_mm, heading_rad), rng)
     return np.where(present, height - height[present].min(), ABSENT).astype(np.float32)
 
 
-def worn(mask: NDArray[np.float32], worn_um: float) -> NDArray[np.float32]:
-    """A mask after `worn_um` of its height has been rubbed off: drawing cuts the profile flat from below."""
-    return np.where(mask < ABSENT, np.maximum(mask - np.float32(worn_um), 0), ABSENT)
+def _half(tip: "Tip", cell_mm: float) -> float:
+    """Half the tip's width in cells."""
+    return max(0.5 * tip.width_mm / cell_mm, 0.75)
+
+
+@functools.lru_cache(maxsize=8)
+def _shape(tip: "Tip", cell_mm: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Height in um of a tip without bumps, and which cells belong to it."""
+    n = side(tip, cell_mm)
+    y, x = (np.mgrid[:n, :n] - n // 2) / _half(tip, cell_mm)
+    angle = np.deg2rad(tip.angle_deg)
+    along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    rise, present = _profile(tip, along, across, np.hypot(x, y))
+    present[n // 2, n // 2] |= not present.any()  # finer than a cell
+    return DROPS_UM[tip.kind] * rise, present
 
 
 def _profile(
@@ -63,14 +74,20 @@ def _profile(
     return (across / breadth) ** 2, (np.abs(across) <= breadth) & (np.abs(along) <= 1)
 
 
-def _bumps(n: int, wavelength: float, heading_rad: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Smooth noise in [-1, 1], `wavelength` cells across the heading and GROOVE times that along it."""
+@functools.lru_cache(maxsize=16)
+def _groove(wavelength: float, heading_rad: float) -> NDArray[np.float32]:
+    """What smooths noise to bumps `wavelength` cells across the heading and GROOVE times that along it."""
     across = max(0.3 * wavelength, 0.4)
     along = GROOVE * across
     reach = int(np.ceil(2.5 * along))
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     u = (x * np.cos(heading_rad) + y * np.sin(heading_rad)) / along
     v = (y * np.cos(heading_rad) - x * np.sin(heading_rad)) / across
+    return np.asarray(np.exp(-0.5 * (u * u + v * v)), np.float32)
+
+
+def _bumps(n: int, groove: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float64]:
+    """Smooth noise (n, n) in [-1, 1]."""
     noise = rng.standard_normal((n, n)).astype(np.float32)
-    smooth = cv2.filter2D(noise, -1, np.exp(-0.5 * (u * u + v * v)).astype(np.float32), borderType=cv2.BORDER_REFLECT)
+    smooth = cv2.filter2D(noise, -1, groove, borderType=cv2.BORDER_REFLECT)
     return np.clip(smooth / (2 * smooth.std() + 1e-9), -1, 1).astype(np.float64)
