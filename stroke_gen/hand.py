@@ -1,15 +1,18 @@
 """The hand: from ideal paths to strokes with swelling pressure, wobble and overshoot.
 
-All strokes of a coat are worked on at once as flat arrays. Every number is rounded as the drawing's file
+All strokes of a crayon and coat are worked on at once as flat arrays. Every number is rounded as the drawing's file
 rounds it, so that a saved drawing gives the same picture.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .drawing import Stroke, Tip
+from .jit import inner_kernel, lean_kernel
 from .params import Style
 
 Floats = NDArray[np.float32]
@@ -32,24 +35,20 @@ def draw(
     paths: Paths, scale_mm: float, crayon: str, tip: Tip, note: str, style: Style, rng: np.random.Generator
 ) -> list[Stroke]:
     """Strokes along paths given in units of `scale_mm`."""
-    if len(paths.first) < 2:
+    number, width = len(paths.first) - 1, tip.width_mm
+    if not number:
         return []
-    first, last = paths.first[:-1], paths.first[1:] - 1
-    owner = np.repeat(np.arange(len(first)), np.diff(paths.first))
-    path = paths.points.astype(np.float64) * scale_mm
-    _overshoot(path, first, last, style.overshoot * tip.width_mm, rng)
-    along, length = _lengths(path, first, last, owner)
-    path += (
-        _sideways(path, first, last)
-        * (style.wobble * tip.width_mm * _slow(along / (4 * tip.width_mm), owner, rng))[:, None]
-    )
-    force = paths.pressure * (1 + style.swell * _slow(along / (5 * tip.width_mm), owner, rng))
-    force *= _legs(paths.leg, first, style.force_spread, rng) * (1 - TURN_DIP * _turns(paths.leg, first, last))
-    ends = np.minimum(along, length[owner] - along) / (TAPER * tip.width_mm)
-    force *= np.clip(0.55 + 0.45 * ends, 0, 1)
-    newton = np.clip(force * 0.785 * tip.width_mm**2 * style.press, 0.02, 60)
-    xy, force_n = np.round(path, 3).astype(np.float32), np.round(newton, 3).astype(np.float32)
-    return [Stroke(xy[a : b + 1], force_n[a : b + 1], crayon, tip, note) for a, b in zip(first, last, strict=True)]
+    beyond = style.overshoot * width * np.abs(rng.standard_normal((2, number)))
+    wobble, swell = (Slow(rng.standard_normal(TABLE), rng.integers(TABLE, size=number)) for _ in range(2))
+    legs = number + np.count_nonzero(np.diff(paths.leg))  # or fewer
+    firmness = np.exp(style.force_spread * rng.standard_normal(legs))
+    path, along = paths.points.astype(np.float64) * scale_mm, np.empty(len(paths.points))
+    xy, force_n = np.empty(path.shape, np.float32), np.empty(len(path), np.float32)
+    _lead(path, paths.first, beyond, along, wobble, style.wobble * width, 4 * width, xy)
+    _press(along, paths.pressure, paths.leg, paths.first, firmness, swell, style.swell, 5 * width, TAPER * width,
+           TURN_DIP, 0.785 * width**2 * style.press, force_n)  # fmt: skip
+    bounds = paths.first.tolist()
+    return [Stroke(xy[a:b], force_n[a:b], crayon, tip, note) for a, b in pairwise(bounds)]
 
 
 def within(strokes: list[Stroke], width_mm: float, height_mm: float) -> list[Stroke]:
@@ -68,64 +67,69 @@ def _all_within(points: Floats, low: Floats, high: Floats) -> bool:
     return bool(((low <= points) & (points <= high)).all())
 
 
-def _overshoot(
-    path: NDArray[np.float64], first: NDArray[np.int64], last: NDArray[np.int64], by_mm: float, rng: np.random.Generator
-) -> None:
-    """Move both ends of each path outwards along its direction, by the absolute value of a normal deviate."""
-    inner = np.minimum(2, last - first)
-    for end, near in ((first, first + inner), (last, last - inner)):
-        direction = path[end] - path[near]
-        norm = np.maximum(np.hypot(*direction.T), 1e-9)
-        path[end] += direction / norm[:, None] * (by_mm * np.abs(rng.standard_normal(len(end))))[:, None]
+class Slow(NamedTuple):
+    """Noise of about unit variance along each path, smooth over a length of 1: each walks through one table."""
+
+    table: NDArray[np.float64]
+    begin: NDArray[np.int64]  # by path
 
 
-def _lengths(
-    path: NDArray[np.float64], first: NDArray[np.int64], last: NDArray[np.int64], owner: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Length along its path of each point, and of each path."""
-    step = np.zeros(len(path))
-    step[1:] = np.hypot(*np.diff(path, axis=0).T)
-    step[first] = 0
-    total = np.cumsum(step)
-    along = total - total[first][owner]
-    return along, along[last]
+@inner_kernel
+def _noise(slow, s, along):  # type: ignore[no-untyped-def]
+    """Slow noise of path s at a length along it."""
+    low = int(along)
+    at, part = slow.begin[s] + low, along - low
+    return slow.table[at % slow.table.size] * (1 - part) + slow.table[(at + 1) % slow.table.size] * part
 
 
-def _sideways(path: NDArray[np.float64], first: NDArray[np.int64], last: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Unit normal of each path at each of its points."""
-    ahead, behind = np.arange(1, len(path) + 1), np.arange(-1, len(path) - 1)
-    ahead[last], behind[first] = last, first
-    tangent = path[ahead] - path[behind]
-    tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
-    return np.stack([-tangent[:, 1], tangent[:, 0]], 1)
+@lean_kernel
+def _lead(path, first, beyond, along, wobble, aside, wave, xy):  # type: ignore[no-untyped-def]
+    """Where the hand leads the crayon: path (n, 2) in mm and the length `along` it (n,), both written to; xy (n, 2).
+
+    Each path goes on beyond its beginning and its end by so many mm, `beyond` (2, paths), and swerves to its side by
+    the noise `wobble` times `aside` mm, smooth over a length of `wave` mm.
+    """
+    for s in range(first.size - 1):
+        a, b = first[s], first[s + 1] - 1
+        inner = min(2, b - a)
+        for end, near, far in ((a, a + inner, beyond[0, s]), (b, b - inner, beyond[1, s])):
+            dx, dy = path[end, 0] - path[near, 0], path[end, 1] - path[near, 1]
+            norm = max(np.sqrt(dx * dx + dy * dy), 1e-9)
+            path[end, 0] += dx / norm * far
+            path[end, 1] += dy / norm * far
+        walked = 0.0
+        for i in range(a, b + 1):
+            j, k = max(i - 1, a), min(i + 1, b)
+            walked += np.sqrt((path[i, 0] - path[j, 0]) ** 2 + (path[i, 1] - path[j, 1]) ** 2)
+            along[i] = walked
+            tx, ty = path[k, 0] - path[j, 0], path[k, 1] - path[j, 1]
+            swerve = aside * _noise(wobble, s, walked / wave) / max(np.sqrt(tx * tx + ty * ty), 1e-9)
+            xy[i, 0] = np.floor((path[i, 0] - ty * swerve) * 1000 + 0.5) / 1000
+            xy[i, 1] = np.floor((path[i, 1] + tx * swerve) * 1000 + 0.5) / 1000
 
 
-def _slow(along: NDArray[np.float64], owner: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """Noise of about unit variance along each path, smooth over a length of 1."""
-    table = rng.standard_normal(TABLE)
-    at = rng.integers(TABLE, size=int(owner[-1]) + 1)[owner] + along
-    low = at.astype(np.int64)
-    part = at - low
-    return np.asarray(table[low % TABLE] * (1 - part) + table[(low + 1) % TABLE] * part)
+@inner_kernel
+def _turns(leg, i, j, a, b):  # type: ignore[no-untyped-def]
+    """Whether points i and j both belong to the path from a to b, and to different legs."""
+    return i >= a and j <= b and leg[i] != leg[j]
 
 
-def _legs(
-    leg: NDArray[np.int32], first: NDArray[np.int64], spread: float, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """A factor on the force for each leg, log-normal."""
-    begins = np.zeros(len(leg), np.int64)
-    begins[1:] = np.diff(leg) != 0
-    begins[first] = 1
-    number = np.cumsum(begins) - 1
-    return np.asarray(np.exp(spread * rng.standard_normal(int(number[-1]) + 1))[number])
+@lean_kernel
+def _press(along, pressure, leg, first, firmness, swell, swelling, wave, taper, dip, area, force_n):  # type: ignore[no-untyped-def]
+    """How hard the hand presses: force_n (n,) in newton.
 
-
-def _turns(leg: NDArray[np.int32], first: NDArray[np.int64], last: NDArray[np.int64]) -> NDArray[np.float64]:
-    """1 at the points where one leg of a zigzag gives way to the next, fading over two points."""
-    changes = np.diff(leg) != 0
-    changes[last[:-1]] = False
-    where = np.flatnonzero(changes)
-    turn = np.zeros(len(leg))
-    for offset, share in ((-1, 0.5), (2, 0.5), (0, 1.0), (1, 1.0)):
-        turn[np.clip(where + offset, 0, len(leg) - 1)] = share
-    return turn
+    The pressure swells slowly, each leg of a zigzag has a `firmness` of its own, the hand gives way where one leg
+    turns into the next, and lines begin and end lightly.
+    """
+    number = -1  # of the leg
+    for s in range(first.size - 1):
+        a, b = first[s], first[s + 1] - 1
+        for i in range(a, b + 1):
+            number += i == a or leg[i] != leg[i - 1]
+            force = pressure[i] * (1 + swelling * _noise(swell, s, along[i] / wave)) * firmness[number]
+            if _turns(leg, i, i + 1, a, b) or _turns(leg, i - 1, i, a, b):
+                force *= 1 - dip
+            elif _turns(leg, i + 1, i + 2, a, b) or _turns(leg, i - 2, i - 1, a, b):
+                force *= 1 - dip / 2
+            force *= min(0.55 + 0.45 * min(along[i], along[b] - along[i]) / taper, 1.0)
+            force_n[i] = np.floor(min(max(force * area, 0.02), 60.0) * 1000 + 0.5) / 1000

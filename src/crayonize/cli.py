@@ -9,6 +9,8 @@ it names, cannot be used; 3 an extra package is missing; 130 Ctrl-C; 143 termina
 """
 
 import argparse
+import atexit
+import gc
 import os
 import signal
 import sys
@@ -43,6 +45,7 @@ other commands:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     words = list(sys.argv[1:] if words is None else words)
+    atexit.register(gc.freeze)  # what is left at the end goes as a whole; to look through it first takes 0.2 s
     with suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     for stream in (sys.stdout, sys.stderr):
