@@ -27,8 +27,8 @@ class Watch(Protocol):
     def open(self, easel: "Easel") -> None:
         """A bare sheet is on the easel."""
 
-    def strokes(self, strokes: Sequence[Stroke], share: float) -> rub.Watch:
-        """Strokes are about to be drawn; `share` of the whole work they are (0..1)."""
+    def strokes(self, strokes: Sequence[Stroke], share: float) -> rub.Watch | None:
+        """Strokes are about to be drawn; `share` of the whole work they are (0..1). None: no need to tell of each."""
 
 
 @dataclass
