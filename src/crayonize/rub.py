@@ -31,7 +31,7 @@ FACES = 3  # different sets of bumps
 HEADINGS = 9  # directions in which the bumps are drawn out, over half a turn
 
 Progress = Callable[[int, int], None]
-Drawn = Callable[[NDArray[np.int64]], None]
+Drawn = Callable[[int], None]
 Watch = Callable[[NDArray[np.float32], NDArray[np.int64], NDArray[np.float32]], Drawn]
 
 
@@ -120,8 +120,8 @@ def rub(
     """Draw strokes on a sheet in order; returns the wax the crayons gave, in um times cells.
 
     watch: is given the points (n, 3) in cells, where each stroke begins among them, and how far each reaches; what
-    it returns is called, in any thread, with the numbers of strokes just drawn: then the tiles (of schedule.TILE
-    cells) within their reach hold these strokes and all before them, and no later one.
+    it returns is called, in any thread, with the number of the stroke just drawn: then the tiles (of schedule.TILE
+    cells) within its reach hold this stroke and all before it, and no later one.
     """
     if not strokes:
         return 0.0
@@ -143,7 +143,7 @@ def rub(
         last: int = _rub(queue, done, drawn is not None, points, first, wax_of, tip_of, worn_of, masks, sides,
                          box.reach, np.float32(STEP), *around, loss, desk.window)  # fmt: skip
         if drawn and last >= 0:
-            drawn(np.array([last]))
+            drawn(last)
         return last
 
     def report(done: int) -> None:

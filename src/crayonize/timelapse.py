@@ -259,19 +259,18 @@ class _Scene:
         due = np.empty((counted, 3), np.int64)
         _due(points, first, reach, self.frame_of, view.cells, view.board(), due)
         due = due[::-1]
-        begin = np.searchsorted(due[:, 0], np.arange(len(self.strokes) + 1))
+        begin = np.searchsorted(due[:, 0], np.arange(len(self.strokes) + 1)).tolist()
         squares = np.ascontiguousarray(due[:, 1:])
 
-        def drawn(picked: NDArray[np.int64]) -> None:
-            wanted = [squares[begin[s] : begin[s + 1]] for s in picked]
-            patches = view.look(np.concatenate(wanted))
-            parts = np.split(patches, np.cumsum([len(w) for w in wanted])[:-1])
+        def drawn(stroke: int) -> None:
+            where, frame = squares[begin[stroke] : begin[stroke + 1]], self.frame_of[stroke]
+            patches = view.look(where) if len(where) else None
             with self.news:
-                for stroke, where, part in zip(picked, wanted, parts, strict=True):
-                    frame = self.frame_of[stroke]
-                    self.seen[frame].append((where, part))
-                    self.missing[frame] -= 1
-                self.news.notify()
+                if patches is not None:
+                    self.seen[frame].append((where, patches))
+                self.missing[frame] -= 1
+                if not self.missing[frame]:
+                    self.news.notify()
 
         return drawn
 
