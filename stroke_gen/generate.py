@@ -85,11 +85,11 @@ def _coat(plan: Plan, now: Floats, coat: Pass, style: Style, rng: np.random.Gene
     how = hatching.Hatch(
         coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single
     )
-    rngs = rng.spawn(len(box.names))
+    rngs, hold = rng.spawn(len(box.names)), replace(style, press=style.press * coat.press)
 
     def drawn(k: int) -> list[Stroke]:
         paths = hatching.hatch(wants[k], tangent.result(), scene.coherence, how, rngs[k])
-        return hand.draw(paths, scene.cell_mm, box.names[k], tip, coat.name, style, rngs[k])
+        return hand.draw(paths, scene.cell_mm, box.names[k], tip, coat.name, hold, rngs[k])
 
     order = sorted(wants, key=lambda k: -box.lightness()[k])
     return [stroke for strokes in plan.pool.map(drawn, order) for stroke in strokes]

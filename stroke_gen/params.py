@@ -31,6 +31,7 @@ class Pass:
     cohere: Annotated[float, 0, 6] = 1.0  # tips over which neighbours agree on a crayon
     edge: Annotated[float, 0.1, 2] = 0.4  # tips: share of the tip that must gain; small keeps borders crisp
     hardest: Annotated[float, 0.03, 2] = 2.0  # N/mm^2 at most, so that what lies below stays to be seen
+    press: Annotated[float, 0.1, 5] = 1.0  # factor on its forces: wax takes hold of wax less than of paper
     gain: Annotated[float, 0, 1] = 0.02  # least gain in colour (OKLab) for which the hand moves
     detail: Annotated[float, 0, 1] = 0.0  # only where the photo has at least this much detail
     tone: Annotated[float, 0, 4] = 1.0  # weight of lightness against colour: small in a first coat that seeks the hue

@@ -20,6 +20,7 @@ SAMPLES = 40  # colours by which a group is judged
 GRAIN_PRICE = 0.35  # OKLab units per unit of grain
 LAYER_PRICE = 0.008  # for the second crayon
 CLASH_PRICE = 0.17  # for two crayons of opposing hue (see `clash`): red over green is no brown for skin
+DULL_PRICE = 0.02  # for grey with another crayon where the colour is strong: it tones a red hat down, and looks dirty
 LIKE = 0.07  # OKLab distance within which groups are alike
 AGREEMENT = 0.04  # what sharing both crayons with all groups alike is worth
 RIVAL = 0.015  # a base this little dearer lies between the lines of the first ...
@@ -113,6 +114,8 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
     extra = np.where(pairs[:, 0] != pairs[:, 1], LAYER_PRICE + CLASH_PRICE * opposed, 0).astype(np.float32)
     _costs(sample, swatches.a, swatches.b, swatches.grain, swatches.paper, heavy, pairs, extra, TO_LMS, TO_LAB,
            np.float32(GRAIN_PRICE), cost)  # fmt: skip
+    heavy_lab = oklab(swatches.over(swatches.paper))[:, -1]
+    cost += DULL_PRICE * np.outer(_strength(centres), _greyness(heavy_lab)[pairs].max(1))
     allowed = _box(cost, pairs, size / size.sum(), count, most)
     cost[:, ~(allowed[pairs[:, 0]] & allowed[pairs[:, 1]])] = 9
     best = _agree(cost, pairs, centres)
@@ -125,6 +128,17 @@ def clash(one: Floats, other: Floats) -> Floats:
     dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
     squares = (one[..., 0] ** 2 + one[..., 1] ** 2) * (other[..., 0] ** 2 + other[..., 1] ** 2)
     return np.asarray(np.sqrt(np.maximum(np.sqrt(squares) - dot, 0)))
+
+
+def _strength(colours: Floats) -> Floats:
+    """How strong OKLab colours (n, 3) are: 0 for earth and skin, 1 for flowers and toys."""
+    return np.clip((np.linalg.norm(colours[:, 1:], axis=1) - 0.12) / 0.1, 0, 1).astype(np.float32)
+
+
+def _greyness(colours: Floats) -> Floats:
+    """How grey OKLab colours (n, 3) are: 1 for a grey, 0 for a hue and for black."""
+    chroma = np.linalg.norm(colours[:, 1:], axis=1)
+    return (np.exp(-((chroma / 0.06) ** 2)) * np.clip((colours[:, 0] - 0.25) / 0.2, 0, 1)).astype(np.float32)
 
 
 def _group(colours: Floats, groups: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
