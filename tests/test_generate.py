@@ -247,6 +247,18 @@ def test_strokes_come_coat_by_coat_and_light_before_dark():
         assert np.diff(light).max(initial=-1) <= 1e-6, order[coat]
 
 
+def test_a_coat_is_pressed_as_hard_as_it_says():
+    style = load_style("artist")
+    soft, hard = (
+        strokes_for(PICTURES["clouds"], replace(style, passes=(replace(style.passes[0], press=press),), lines=0.0))
+        for press in (1.0, 1.5)
+    )
+    assert len(soft) > 20
+    for one, two in zip(soft, hard, strict=True):
+        assert np.array_equal(one.path_mm, two.path_mm)
+        np.testing.assert_allclose(two.force_n, (1.5 * one.force_n).clip(0.02, 60), atol=0.011)
+
+
 def test_focus_draws_finer_there():
     plain = PICTURES["grey"] + 0.1 * clouds(3)
     sharp = []

@@ -125,6 +125,33 @@ def test_opposing_hues_have_their_price(monkeypatch, price, taken):
     assert ({few.names[result.base[0]], few.names[result.shade[0]]} == {"red", "green"}) is taken
 
 
+@pytest.mark.parametrize("price, taken", [(0.0, True), (1.0, False)])
+def test_grey_under_a_strong_colour_has_its_price(monkeypatch, price, taken):
+    """Grey under red fits this dull red exactly; whether it is taken is a matter of the price."""
+    monkeypatch.setattr(recipes, "DULL_PRICE", price)
+    monkeypatch.setitem(COLOURS, "grey", (0.25, 0.25, 0.25))
+    table = box()
+    few = table.only([table.names.index(name) for name in ("red", "grey", "black")])
+    dull_red = few.over(few.over(few.paper)[1, 4])[0, 3]
+    result = found(patches(dull_red), table=few)
+    assert ({few.names[result.base[0]], few.names[result.shade[0]]} == {"grey", "red"}) is taken
+
+
+def test_greys_go_with_earth_and_stone(monkeypatch):
+    """What is not strong may have grey in it at any price, and black is no grey."""
+    monkeypatch.setattr(recipes, "DULL_PRICE", 1.0)
+    monkeypatch.setitem(COLOURS, "grey", (0.25, 0.25, 0.25))
+    table = box()
+    few = table.only([table.names.index(name) for name in ("brown", "grey")])
+    stone = few.over(few.over(few.paper)[1, 3])[0, 1]
+    result = found(patches(stone), table=few)
+    assert (few.names[result.base[0]], few.names[result.shade[0]]) == ("grey", "brown")
+    few = table.only([table.names.index(name) for name in ("red", "black")])
+    dark_red = few.over(few.over(few.paper)[0, 4])[1, 1]
+    result = found(patches(dark_red), table=few)
+    assert (few.names[result.base[0]], few.names[result.shade[0]]) == ("red", "black")
+
+
 def test_rival_is_nearly_as_good_and_of_like_hue_under_the_same_shade():
     hues = np.array([[0.1, 0.1], [0.12, 0.1], [-0.2, 0.1], [0, 0], [0.1, 0.12]], np.float32)
     pairs = np.array([[0, 3], [1, 3], [2, 3], [4, 2], [3, 3]])
