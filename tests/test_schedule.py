@@ -71,6 +71,27 @@ def test_strokes_that_come_close_are_drawn_in_order(far):
     assert met > 20
 
 
+def test_no_tile_within_reach_of_a_path_is_missed():
+    """However near or far apart its points lie: here some lie close together, then comes a jump."""
+    rng, size, reach = np.random.default_rng(8), 400, 1.0
+    tiles = size // schedule.TILE
+    for _ in range(300):
+        near, jump = rng.uniform(0.2, 1.1), rng.uniform(6, 20)
+        steps = np.tile([near] * 8 + [jump], 4)[:, None] * np.sign(rng.normal(0, 1, 2))
+        points, first = packed([rng.uniform(0.3, 0.7, 2) * size + np.cumsum(steps, 0)])
+        mark, found = np.full((tiles, tiles), -1, np.int32), np.empty(tiles**2, np.int32)
+        wide = np.full(1, reach + schedule.TILE // 2, np.float32)
+        number = schedule._touch(points, first, wide, 0, size, size, schedule.TILE, mark, found)
+        assert len(set(found[:number])) == number == (mark == 0).sum()
+        way = np.append(0, np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T)))
+        at = np.linspace(0, way[-1], int(2 * way[-1]) + 2)
+        spots = np.column_stack([np.interp(at, way, points[:, c]) for c in range(2)])
+        for corner in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            x, y = ((spots + reach * np.array(corner)) // schedule.TILE).astype(int).T
+            inside = (x >= 0) & (y >= 0) & (x < tiles) & (y < tiles)
+            assert (mark[y[inside], x[inside]] == 0).all()
+
+
 def test_strokes_of_one_level_change_disjoint_cells(bench, monkeypatch):
     """Smearing included: each stroke is drawn alone on a coated sheet, and what it changes is compared."""
     rng = np.random.default_rng(3)
@@ -182,8 +203,8 @@ def test_what_is_ready_comes_off_the_heap_in_order():
         held.append(number)
 
 
-@pytest.mark.parametrize("threads", [4, 16])
-def test_the_lock_lets_one_thread_in_at_a_time(threads):
+@pytest.mark.parametrize("threads, times", [(4, 400_000), (12, 100_000)])
+def test_the_lock_lets_one_thread_in_at_a_time(threads, times):
     """Kernels on many threads count up without ever losing a step."""
 
     @lean_kernel
@@ -196,9 +217,9 @@ def test_the_lock_lets_one_thread_in_at_a_time(threads):
 
     lock, counter = np.zeros(1, np.int32), np.zeros(1, np.int64)
     count(lock, counter, 1)
-    hands = [threading.Thread(target=count, args=(lock, counter, 20_000)) for _ in range(threads)]
+    hands = [threading.Thread(target=count, args=(lock, counter, times)) for _ in range(threads)]
     for hand in hands:
         hand.start()
     for hand in hands:
         hand.join()
-    assert counter[0] == 20_000 * threads + 1
+    assert counter[0] == times * threads + 1
