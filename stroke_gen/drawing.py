@@ -20,7 +20,6 @@ left out. Whether paper, palette and crayons exist is for the program that draws
 
 import contextlib
 import difflib
-import functools
 import json
 import math
 import os
@@ -292,13 +291,7 @@ def _tip(data: Any, default: Tip, where: str) -> Tip:
         angle_deg=data.get("angle_deg", default.angle_deg),
     )
     _check_tip(tip, where)
-    return _shared_tip(tip.kind, float(tip.width_mm), float(tip.angle_deg))
-
-
-@functools.lru_cache(maxsize=1024)
-def _shared_tip(kind: str, width_mm: float, angle_deg: float) -> Tip:
-    """One Tip for all strokes alike."""
-    return Tip(kind, width_mm, angle_deg)
+    return Tip(tip.kind, float(tip.width_mm), float(tip.angle_deg))
 
 
 # ---- writing ---------------------------------------------------------------------------------------------

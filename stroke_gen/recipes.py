@@ -107,15 +107,14 @@ def find(lab: Floats, swatches: Swatches, groups: int, most: int, rng: np.random
     light = swatches.lightness()
     count = len(swatches.names)
     pairs = np.array([(i, j) for i in range(count) for j in range(count) if i == j or light[i] > light[j]], np.int64)
-    heavy = swatches.over(swatches.paper)[:, -1].sum(1)
+    bare = swatches.over(swatches.paper)
     cost = np.empty((len(centres), len(pairs)), np.float32)
-    hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
+    hues = oklab(bare)[:, -3, 1:]
     opposed = clash(hues[pairs[:, 0]], hues[pairs[:, 1]])
     extra = np.where(pairs[:, 0] != pairs[:, 1], LAYER_PRICE + CLASH_PRICE * opposed, 0).astype(np.float32)
-    _costs(sample, swatches.a, swatches.b, swatches.grain, swatches.paper, heavy, pairs, extra, TO_LMS, TO_LAB,
-           np.float32(GRAIN_PRICE), cost)  # fmt: skip
-    heavy_lab = oklab(swatches.over(swatches.paper))[:, -1]
-    cost += DULL_PRICE * np.outer(_strength(centres), _greyness(heavy_lab)[pairs].max(1))
+    _costs(sample, swatches.a, swatches.b, swatches.grain, swatches.paper, bare[:, -1].sum(1), pairs, extra,
+           TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), cost)  # fmt: skip
+    cost += DULL_PRICE * np.outer(_strength(centres), _greyness(oklab(bare[:, -1]))[pairs].max(1))
     allowed = _box(cost, pairs, size / size.sum(), count, most)
     cost[:, ~(allowed[pairs[:, 0]] & allowed[pairs[:, 1]])] = 9
     best = _agree(cost, pairs, centres)

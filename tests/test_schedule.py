@@ -81,7 +81,7 @@ def test_no_tile_within_reach_of_a_path_is_missed():
         points, first = packed([rng.uniform(0.3, 0.7, 2) * size + np.cumsum(steps, 0)])
         mark, found = np.full((tiles, tiles), -1, np.int32), np.empty(tiles**2, np.int32)
         wide = np.full(1, reach + schedule.TILE // 2, np.float32)
-        number = schedule._touch(points, first, wide, 0, size, size, schedule.TILE, mark, found)
+        number = schedule._touch(points, first, wide, 0, schedule.TILE, mark, found)
         assert len(set(found[:number])) == number == (mark == 0).sum()
         way = np.append(0, np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T)))
         at = np.linspace(0, way[-1], int(2 * way[-1]) + 2)

@@ -11,7 +11,6 @@ KINDS = ("sharp", "blunt", "rim", "side")
 
 def made(kind="blunt", width_mm=2.4, cell_mm=0.1, worn_um=0.0, angle_deg=0.0, seed=0):
     mask = tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed))
-    assert len(mask) == tip.side(Tip(kind, width_mm, angle_deg), cell_mm)
     desk = contact.window(mask.size, 1)
     contact._press(desk, mask.ravel(), np.float32(worn_um), len(mask), 1000)
     return desk.mask.reshape(mask.shape)

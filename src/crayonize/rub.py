@@ -63,14 +63,10 @@ class Box:
         The wear goes on by force times length.
         """
         taken, worn_um = np.empty(len(strokes), np.int64), np.empty(len(strokes), np.float32)
-        shapes = {id(stroke.tip): stroke.tip for stroke in strokes}  # far fewer than strokes, and slow to compare
-        same = {shape: shape for shape in shapes.values()}
-        alike = {key: id(same[shape]) for key, shape in shapes.items()}
-        mine_of: dict[tuple[str, int], list[int]] = {}
+        mine_of: dict[tuple[str, Tip], list[int]] = {}
         for i, stroke in enumerate(strokes):
-            mine_of.setdefault((stroke.crayon, alike[id(stroke.tip)]), []).append(i)
-        for (crayon, key), mine in mine_of.items():
-            shape = shapes[key]
+            mine_of.setdefault((stroke.crayon, stroke.tip), []).append(i)
+        for (crayon, shape), mine in mine_of.items():
             per_newton_mm = worn_per_newton_mm(self.constants) / (0.785 * shape.width_mm**2)
             so_far = self.worn_um.get((crayon, shape), 0.0)
             worn = np.add.accumulate(np.append(so_far, per_newton_mm * newton_mm[mine]))

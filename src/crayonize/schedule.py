@@ -35,7 +35,7 @@ class Order(NamedTuple):
 
 
 @kernel
-def _touch(points, first, reach, s, rows, cols, tile, mark, found):  # type: ignore[no-untyped-def]
+def _touch(points, first, reach, s, tile, mark, found):  # type: ignore[no-untyped-def]
     """Numbers of the tiles within `reach` of stroke s's path into `found`; returns how many.
 
     The path is sampled once a tile, so samples must reach half a tile further than the tip.
@@ -76,7 +76,7 @@ def _order(points, first, reach, rows, cols, tile):  # type: ignore[no-untyped-d
     waits, begins = np.zeros(strokes, np.int32), np.zeros(strokes + 1, np.int64)
     pairs, known = np.empty((8 * strokes, 2), np.int32), 0  # one waited for, and one that waits
     for s in range(strokes):
-        for n in range(_touch(points, first, reach, s, rows, cols, tile, mark, found)):
+        for n in range(_touch(points, first, reach, s, tile, mark, found)):
             before = last[found[n]]
             last[found[n]] = s
             if before >= 0 and heir[before] != s:

@@ -24,15 +24,10 @@ SIDE_MM = 2.6  # breadth of the strip on which a lying crayon touches the paper
 DROPS_UM = {"sharp": 110.0, "blunt": 32.0, "rim": 60.0, "side": 40.0}  # centre to edge
 
 
-def side(tip: "Tip", cell_mm: float) -> int:
-    """How many cells a mask is wide, an odd number."""
-    return 2 * int(np.ceil(_half(tip, cell_mm))) + 1
-
-
 def mask(tip: "Tip", cell_mm: float, rng: np.random.Generator, heading_rad: float = 0.0) -> NDArray[np.float32]:
     """The mask of a fresh tip on a grid of `cell_mm`, with grooves along `heading_rad`, the way it moves.
 
-    Returns (n, n) float32 in um with n of `side`, the lowest present cell at 0.
+    Returns (n, n) float32 in um with n odd, the lowest present cell at 0.
     """
     if tip.kind not in DROPS_UM:
         raise ValueError(f"tip.kind: {tip.kind!r} is none of {', '.join(DROPS_UM)}")
@@ -43,16 +38,12 @@ def mask(tip: "Tip", cell_mm: float, rng: np.random.Generator, heading_rad: floa
     return np.where(present, height - height[present].min(), ABSENT).astype(np.float32)
 
 
-def _half(tip: "Tip", cell_mm: float) -> float:
-    """Half the tip's width in cells."""
-    return max(0.5 * tip.width_mm / cell_mm, 0.75)
-
-
 @functools.lru_cache(maxsize=8)
 def _shape(tip: "Tip", cell_mm: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Height in um of a tip without bumps, and which cells belong to it."""
-    n = side(tip, cell_mm)
-    y, x = (np.mgrid[:n, :n] - n // 2) / _half(tip, cell_mm)
+    half = max(0.5 * tip.width_mm / cell_mm, 0.75)
+    n = 2 * int(np.ceil(half)) + 1
+    y, x = (np.mgrid[:n, :n] - n // 2) / half
     angle = np.deg2rad(tip.angle_deg)
     along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
     rise, present = _profile(tip, along, across, np.hypot(x, y))
