@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import hand
-from .analysis import Scene, blur
+from .analysis import blur
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .jit import kernel
 from .params import Style
+from .scene import Scene
 from .separation import Plan
 from .swatches import Swatches
 
@@ -48,7 +49,7 @@ class Lines:
 
 def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
     """Outline strokes for a plan whose sheet shows `now` (h, w, 3), light crayons first."""
-    scene, box = plan.scene, plan.swatches.only(plan.recipes.crayons())
+    scene, box = plan.scene, plan.swatches
     if style.lines <= 0:
         return []
     tip = Tip("sharp", round(style.line_tip * style.tip_mm, 3))  # as the drawing's file rounds it
@@ -57,7 +58,7 @@ def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) ->
     lines = _edges(scene, lightness, width)
     if style.closed:  # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
         small = _means(_sample(scene.detail, lines.points), lines.first) > 0.45
-        lines = _together(_areas(scene, plan.group, lightness, width), lines.only(np.flatnonzero(small)))
+        lines = _together(_areas(scene, scene.label, lightness, width), lines.only(np.flatnonzero(small)))
     order = np.argsort(-lines.worth, kind="stable")
     length = np.cumsum(np.diff(lines.first)[order])
     lines = lines.only(order[length <= style.lines * BUDGET * max(scene.detail.shape)])
@@ -94,7 +95,7 @@ def _edges(scene: Scene, lightness: Floats, width: float) -> Lines:
     return _lines(fair, scene, lightness, width)
 
 
-def _areas(scene: Scene, group: NDArray[np.int64], lightness: Floats, width: float) -> Lines:
+def _areas(scene: Scene, group: NDArray[np.int32], lightness: Floats, width: float) -> Lines:
     """Closed lines round the larger areas of one colour."""
     chains = []
     for g in np.flatnonzero(np.bincount(group.ravel())):

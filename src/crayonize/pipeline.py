@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stroke_gen import params
 from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
-from stroke_gen.generate import generate
+from stroke_gen.generate import generate, stages as count_stages
 
 from . import calibration, optics, paper, rub
 from .palette import Palette, load_palette
@@ -128,7 +128,7 @@ def sketch(
                   smears=not settings.preview)  # fmt: skip
     stand.show_to(watch)
     table = calibration.swatches(stand.box.palette, paper.load_paper(settings.paper), settings.physics, stand.threads)
-    stages = len(style.passes) + 1 + style.lines_first
+    stages = count_stages(style)
     done = 0
 
     def draw(strokes: list[Stroke]) -> None:
