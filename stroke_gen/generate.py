@@ -70,7 +70,7 @@ def _stages(plan: Plan, inside: Floats, style: Style, rng: np.random.Generator) 
 
 def _plan(seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generator, pool: Executor) -> Plan:
     """Take crayons out of the box."""
-    mixtures = mixing.find(seen.guide.lab, seen.label, swatches, style.crayons, rng)
+    mixtures = mixing.find(seen.guide.lab, seen.family, swatches, style.crayons, rng)
     return Plan(seen, swatches.only(mixtures.crayons()), mixtures.alone(), pool)
 
 

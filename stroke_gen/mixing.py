@@ -19,13 +19,13 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
 LAYERS = 4  # crayons in a mixture at most
-SAMPLES = 36  # colours by which a surface is judged
+SAMPLES = 24  # colours by which a surface is judged
 GRAIN_PRICE = 0.3  # OKLab units per unit of grain
 LAYER_PRICE = 0.007  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 DARK_PRICE = 0.12  # for a crayon darker than the surface's darkest, times the difference of lightness
-BEAM = 5  # mixtures of each length that are tried with one crayon more
+BEAM = 3  # mixtures of each length that are tried with one crayon more
 FEW = np.array([0, 1, 3, 4, 6])  # pressures of four crayons; of three and fewer all are tried
 
 

@@ -29,6 +29,7 @@ class Scene:
     lab: Floats  # (h, w, 3) the same as OKLab, chroma doubled
     guide: Guide  # calmed colours: what a thick crayon aims at
     label: NDArray[np.int32]  # (h, w) surface of each place
+    family: NDArray[np.int32]  # (h, w) family of surfaces that are coloured alike
     tangent: Floats  # (h, w, 2) unit vector along which strokes run, x then y
     coherence: Floats  # (h, w) 0 no direction of its own .. 1 one clear direction
     care: Floats  # (h, w) 0 ground .. 1 the one who is drawn
@@ -54,12 +55,13 @@ def read(
     calm = oklab(analysis.calmed(target, max(1, round(CALM * tip))))
     structure = pool.submit(lambda: analysis.structure(calm, tip))
     label = surfaces.part(calm, care, care, tip, style.merge)
+    family = surfaces.families(label, calm, np.zeros_like(care), style.merge)[label].astype(np.int32)
     field = structure.result()
     tangent = surfaces.directions(field, label, care, tip, style.wrist_deg, style.wrist)
     coherence = np.hypot(field[..., 0], field[..., 1]) / (field[..., 2] + 1e-6)
     fine = np.clip(care * 1.5, 0, 1)[..., None]
     guide = Guide((calm * (1 - fine) + lab * fine).astype(np.float32), WINDOW * tip)
-    return Scene(target, lab, guide, label, tangent, coherence, care, detail.result() * (0.35 + 0.65 * care), cell_mm)
+    return Scene(target, lab, guide, label, family, tangent, coherence, care, detail.result() * (0.35 + 0.65 * care), cell_mm)
 
 
 def _care(linear: Floats) -> Floats:

@@ -79,7 +79,7 @@ def plates(plan: Plan, now: Floats, turn: int, dark_price: float) -> dict[int, F
     shape = guide.coarse.shape[:2]
     ground = np.asarray(cv2.resize(now, shape[::-1], interpolation=cv2.INTER_AREA), np.float32).reshape(-1, 3)
     aim = guide.coarse.reshape(-1, 3)
-    label = cv2.resize(scene.label, shape[::-1], interpolation=cv2.INTER_NEAREST_EXACT).ravel()
+    label = cv2.resize(scene.family, shape[::-1], interpolation=cv2.INTER_NEAREST_EXACT).ravel()
     full = np.arange(len(swatches.pressures) + 1)
     dull = swatches.lightness()
     levels = np.zeros((len(swatches.names), label.size), np.float32)

@@ -137,7 +137,7 @@ def _worthiest(
     plan: Plan, now: Floats, aim: Floats, need: NDArray[np.bool_], coat: Pass, cells: float
 ) -> NDArray[np.uint8]:
     """The crayon (h, w) that gains most, where neighbours agree over `coat.cohere` tips."""
-    swatches, label = plan.swatches, plan.scene.label
+    swatches, label = plan.swatches, plan.scene.family
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
     own = np.stack([(plan.mixtures.layers == k).any(1) for k in range(len(swatches.names))])
     asked = cv2.dilate(need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells)))
