@@ -15,6 +15,7 @@ from .mixing import LAYERS
 from .params import Pass, Style
 from .scene import Scene
 from .separation import Plan
+from .subject import Subject
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
@@ -25,10 +26,10 @@ Stage = Callable[[Floats], list[Stroke]]
 
 
 def generate(
-    photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, seed: int, *,
+    photo: Floats, subject: Subject, width_mm: float, height_mm: float, swatches: Swatches, style: Style, seed: int, *,
     draw: Draw, look: Look, threads: int, focus: Sequence[tuple[float, float, float, float]] = (),
 ) -> list[Stroke]:  # fmt: skip
-    """Strokes for a photo in linear light (h, w, 3), in drawing order.
+    """Strokes for a photo in linear light (h, w, 3) of a subject (see `subject.see`), in drawing order.
 
     draw(strokes) draws further strokes on the open sheet; look(shape) returns what it shows now, as linear light
     on a grid of `shape`: the generator steps back and looks before each coat.
@@ -36,7 +37,7 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
     with ThreadPoolExecutor(threads) as pool:
-        seen = scene.read(photo, width_mm, height_mm, swatches, style, focus, pool)
+        seen = scene.read(photo, subject, width_mm, height_mm, swatches, style, focus, pool)
         plan = _plan(seen, swatches, style, rng, pool)
         inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, style.tip_mm / seen.cell_mm, rng)
         for stage in _stages(plan, inside, style, rng):
@@ -70,7 +71,7 @@ def _stages(plan: Plan, inside: Floats, style: Style, rng: np.random.Generator) 
 
 def _plan(seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generator, pool: Executor) -> Plan:
     """Take crayons out of the box."""
-    mixtures = mixing.find(seen.guide.lab, seen.family, swatches, style.crayons, rng)
+    mixtures = mixing.find(seen, swatches, style.crayons, rng)
     return Plan(seen, swatches.only(mixtures.crayons()), mixtures.alone(), pool)
 
 

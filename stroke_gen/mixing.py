@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .colour import TO_LAB, TO_LMS, cube_root, oklab
 from .jit import inner_kernel, kernel
+from .scene import Scene
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
@@ -25,6 +26,9 @@ LAYER_PRICE = 0.007  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 DARK_PRICE = 0.12  # for a crayon darker than the surface's darkest, times the difference of lightness
+BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
+WARM = np.deg2rad(58)  # OKLab hue of both
+SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
 BEAM = 3  # mixtures of each length that are tried with one crayon more
 FEW = np.array([0, 1, 3, 4, 6])  # pressures of four crayons; of three and fewer all are tried
 
@@ -128,11 +132,14 @@ def _try(sample, mixtures, extra, allowed, paper, pressures, a, b, grain, dull, 
             cost[g, q] = _cost(sample[g], colour, price, total) + dear
 
 
-def find(lab: Floats, label: NDArray[np.int32], swatches: Swatches, most: int, rng: np.random.Generator) -> Mixtures:
-    """A mixture for each surface of a picture in OKLab (h, w, 3), of at most `most` crayons in all."""
-    sample, size = _samples(lab, label, rng)
+def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -> Mixtures:
+    """A mixture for each family of surfaces, of at most `most` crayons in all."""
+    sample, size = _samples(seen.guide.lab, seen.family, rng)
     order = np.argsort(-swatches.lightness(), kind="stable")
+    skin, hair = (np.bincount(seen.family.ravel(), m.ravel()) / np.bincount(seen.family.ravel())
+                  for m in (seen.skin, seen.hair))  # fmt: skip
     extra = prices(sample, swatches) + np.float32(LAYER_PRICE)
+    extra += BODY_PRICE * (skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD))
     every = np.ones(len(order), np.bool_)
 
     def tried(mixtures: Ints, allowed: NDArray[np.bool_], pressures: Ints) -> Floats:
@@ -189,6 +196,17 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
     darkest = np.percentile(sample[:, 0], 10, axis=1)
     price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.15, 0)
     return price.astype(np.float32)
+
+
+def foreign(swatches: Swatches, width_rad: float) -> Floats:
+    """How foreign each crayon (crayons,) is to skin or hair: 0 within `width_rad` of their hue, 1 far from it."""
+    hue = oklab(swatches.over(swatches.paper))[:, -3]
+    chroma = np.linalg.norm(hue[:, 1:], axis=1)
+    warm = (hue[:, 1] * np.cos(WARM) + hue[:, 2] * np.sin(WARM)) / (chroma + 1e-6)
+    off = np.clip((np.arccos(np.clip(warm, -1, 1)) - width_rad) / 0.5, 0, 1)
+    grey = np.clip(1 - chroma / 0.05, 0, 1)
+    light = np.clip((hue[:, 0] - 0.85) / 0.1, 0, 1)  # white is at home everywhere
+    return np.maximum(off * (1 - grey), grey * (1 - light)).astype(np.float32)
 
 
 def clash(one: Floats, other: Floats) -> Floats:

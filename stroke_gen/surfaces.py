@@ -21,6 +21,7 @@ EDGE = 0.7  # weight of the step along the common border beside that between the
 SUBJECT = 0.15  # OKLab units: what parts the one who is drawn from the ground
 LARGE = 100.0  # square tips from which size speaks no more against merging
 FAMILY = 0.01  # of the sheet: smaller surfaces join a family more readily
+KIND = np.float32(0.3)  # OKLab units between kinds
 SHAPE = 0.7  # weight of a surface's own long axis when it chooses its direction, beside ...
 FORM = 1.6  # ... that of the structure in it
 FOLLOW = 2.2  # tips: forms this large are followed
@@ -59,9 +60,9 @@ def _merged(label: Labels, lab: Floats, care: Floats, who: Floats, tip: float, l
 def families(label: Labels, lab: Floats, kind: Floats, least: float) -> NDArray[np.int64]:
     """The family (surfaces,), from 0, of each surface: those alike are coloured alike, wherever they lie.
 
-    kind: 0..1 (h, w), of what must not be mixed, as skin and cloth; least: OKLab units between families.
+    kind: (h, w) differs where colours must not be mixed, as skin and cloth; least: OKLab units between families.
     """
-    means, size = _means(label, np.dstack([lab * WEIGHTS, kind, np.zeros_like(kind)]))
+    means, size = _means(label, np.dstack([lab * WEIGHTS, KIND * kind, np.zeros_like(kind)]))
     everywhere = np.ones((size.size, size.size), np.float32) - np.eye(size.size, dtype=np.float32)
     root = np.arange(size.size)
     _merge(means, size, everywhere, np.zeros_like(everywhere), np.float32(FAMILY * label.size), np.float32(0),

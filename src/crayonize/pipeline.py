@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from stroke_gen import params
+from stroke_gen import params, subject
 from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
 from stroke_gen.generate import generate, stages as count_stages
@@ -121,6 +121,7 @@ def sketch(
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
+    who = subject.see(photo, work_shape(width_mm, height_mm))
     photo = fit(photo, work_shape(width_mm, height_mm))  # all that is looked at; the large one may go
     style = _style(settings)
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
@@ -138,7 +139,7 @@ def sketch(
             stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
         done += 1
 
-    strokes = generate(photo, width_mm, height_mm, table, style, settings.seed, draw=draw, look=stand.seen,
+    strokes = generate(photo, who, width_mm, height_mm, table, style, settings.seed, draw=draw, look=stand.seen,
                        threads=stand.threads, focus=settings.focus)  # fmt: skip
     drawing = Drawing(
         width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed
