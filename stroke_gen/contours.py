@@ -18,6 +18,7 @@ from .analysis import blur
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .jit import kernel
+from .mixing import BODY_PRICE, SKIN_RAD, foreign
 from .params import Style
 from .scene import Scene
 from .separation import Plan
@@ -26,6 +27,8 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 SCALE = 2  # edge pixels per work cell
 BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
+DARKER = 0.16  # OKLab L by which a line is darker than what it bounds
+LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
@@ -127,8 +130,10 @@ def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: f
     aside = np.float32(0.6 * width) * _normals(fair)
     contrast = np.abs(_sample(lightness, fair.points + aside) - _sample(lightness, fair.points - aside))
     mean = _means(contrast, fair.first)
-    detail = _means(_sample(scene.detail, fair.points), fair.first)
-    worth = factor * mean * np.diff(fair.first) ** 0.5 * (1 + 1.5 * detail)
+    who = scene.subject.mask
+    care = _means(_sample(scene.care, fair.points), fair.first)
+    rim = _means(np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)), fair.first)
+    worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
     return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.05))
 
 
@@ -199,12 +204,18 @@ def _sample(image: Floats, points: Floats) -> Floats:
 
 
 def _crayons(lines: Lines, scene: Scene, now: Floats, box: Swatches, style: Style) -> tuple[NDArray[np.int64], Floats]:
-    """For each line the crayon and pressure that come nearest to its darker side, or darker."""
-    aside = np.float32(0.6 * style.line_tip * style.tip_mm / scene.cell_mm) * _normals(lines)
+    """For each line the crayon and pressure that come nearest to its darker side's hue, clearly darker than it."""
+    aside = np.float32(0.8 * style.line_tip * style.tip_mm / scene.cell_mm) * _normals(lines)
     sides = [_means(_sample(scene.lab, lines.points + side * aside), lines.first) for side in (1, -1)]
-    aim = np.where(sides[0][:, :1] <= sides[1][:, :1], *sides) - np.array([0.15 if style.closed else 0.05, 0, 0])
+    darker = np.where(sides[0][:, :1] <= sides[1][:, :1], *sides)
     ground = _means(_sample(now, lines.points), lines.first)
-    colours = oklab(box.over(ground))[:, :, 2:]
-    off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 0.8, 0.8]), axis=3)
+    aim = darker.copy()
+    aim[:, 0] = np.minimum(darker[:, 0], oklab(ground)[:, 0]) - DARKER
+    hardest = box.pressures >= LEAST_PRESSURE
+    colours = oklab(box.over(ground))[:, :, hardest]
+    off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 0.7, 0.7]), axis=3)
+    off += 0.3 * np.maximum(colours[..., 0] - aim[:, None, None, 0] - 0.03, 0)
+    skin = _means(_sample(scene.skin, lines.points), lines.first)
+    off += BODY_PRICE * skin[:, None, None] * foreign(box, SKIN_RAD)[None, :, None]
     k, p = np.divmod(off.reshape(len(off), math.prod(off.shape[1:])).argmin(1), off.shape[2])
-    return k, box.pressures[2 + p] * np.float32(style.line_press)
+    return k, box.pressures[hardest][p] * np.float32(style.line_press)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from . import analysis, contours, hand, hatching, margin, mixing, scene, separation, touches
 from .analysis import blur
-from .colour import oklab
 from .drawing import Stroke, Tip
 from .mixing import LAYERS
 from .params import Pass, Style
@@ -19,6 +18,7 @@ from .subject import Subject
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
+CROSS = (0, -1, 1, -2)  # turns of the direction from layer to layer, in `cross`
 SUBJECT = 0.5  # care from which the finer tip is taken
 Draw = Callable[[list[Stroke]], None]
 Look = Callable[[tuple[int, int]], Floats]
@@ -61,8 +61,8 @@ def _stages(plan: Plan, inside: Floats, style: Style, rng: np.random.Generator) 
     if style.lines_first:
         yield lines
     for coat in style.passes:
-        if coat.kind == "fill":
-            for turn in range(LAYERS):
+        if coat.kind != "touch":
+            for turn in range(LAYERS) if coat.kind == "fill" else [None]:
                 yield lambda now, coat=coat, turn=turn: _fill(plan, now, inside, coat, turn, style, rng)
         else:
             yield lambda now, coat=coat: _touch(plan, now, inside, coat, style, rng)
@@ -76,13 +76,13 @@ def _plan(seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generato
 
 
 def _fill(
-    plan: Plan, now: Floats, inside: Floats, coat: Pass, turn: int, style: Style, rng: np.random.Generator
+    plan: Plan, now: Floats, inside: Floats, coat: Pass, turn: int | None, style: Style, rng: np.random.Generator
 ) -> list[Stroke]:
-    """One layer of the mixtures, crayon by crayon, light to dark: wide in the ground, finer where care is due."""
+    """One layer of the mixtures, or all once more, crayon by crayon, light to dark: wide in the ground, finer where care is due."""
     seen = plan.scene
     wide = coat.tip * style.tip_mm / seen.cell_mm
     wants = separation.plates(plan, blur(now, 0.5 * wide), turn, coat.dark_price)
-    tangent = analysis.turned(seen.tangent, np.float32(coat.cross * turn * (-1) ** turn))
+    tangent = analysis.turned(seen.tangent, np.float32(CROSS[turn] * coat.cross if turn is not None else coat.angle))
     gaps = (1 + style.open * (1 - seen.care)).astype(np.float32)
     careful = seen.care > SUBJECT
     parts = []
@@ -100,8 +100,7 @@ def _touch(
     """What is still missing and has a shape of its own, crayon by crayon, light to dark."""
     seen = plan.scene
     cells = coat.tip * style.tip_mm / seen.cell_mm
-    aim = oklab(blur(seen.target, coat.soften * 0.5 * cells))
-    wants = touches.wanted(plan, blur(now, 0.5 * cells), aim, coat, cells)
+    wants = touches.wanted(plan, blur(now, 0.5 * cells), coat, cells)
     order = sorted(wants, key=lambda k: -plan.swatches.lightness()[k])
     parts = [(k, coat.tip, wants[k] * inside) for k in order]
     return _hatched(plan, parts, seen.tangent, np.ones_like(seen.care), coat, style, rng)

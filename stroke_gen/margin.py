@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
-RAGGED = 0.5  # tips to and fro
+RAGGED = 0.45  # tips to and fro
 
 
 def inside(shape: tuple[int, ...], margin: float, tip: float, rng: np.random.Generator) -> Floats:
@@ -22,6 +22,6 @@ def inside(shape: tuple[int, ...], margin: float, tip: float, rng: np.random.Gen
 
 def _ragged(length: int, margin: float, tip: float, rng: np.random.Generator) -> Floats:
     """Width of the margin along one side."""
-    noise = np.abs(rng.standard_normal((1, max(2, int(length / tip) + 2)))).astype(np.float32)
+    noise = np.abs(rng.standard_normal((1, max(2, int(length / (2.5 * tip)) + 2)))).astype(np.float32)
     swing = cv2.resize(noise, (length, 1), interpolation=cv2.INTER_LINEAR)[0]
     return np.asarray(margin + RAGGED * tip * (swing - 0.8), np.float32)

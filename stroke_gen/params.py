@@ -20,7 +20,7 @@ class Pass:
     """One coat of hatching over the whole sheet, after a look at what is there."""
 
     name: str = "coat"
-    kind: Annotated[str, "fill", "touch"] = "fill"  # the mixtures' crayons, layer by layer, or what is still missing
+    kind: Annotated[str, "fill", "add", "touch"] = "fill"  # the mixtures, layer by layer; once more where needed; shapes
     tip: Annotated[float, 0.2, 4] = 1.0  # width of the tip, in usual tips
     fine: Annotated[float, 0.2, 4] = 0.65  # the same where care is due
     sharp: bool = False  # a sharpened tip
@@ -29,6 +29,7 @@ class Pass:
     reach: Annotated[float, 1, 60] = 20.0  # tips: the longest line without moving the arm
     legs: Annotated[int, 1, 60] = 12  # lines in one zigzag
     cross: Annotated[float, 0, 90] = 18.0  # degrees by which the direction turns from layer to layer
+    angle: Annotated[float, -90, 90] = 0.0  # degrees against the surface's direction
     press: Annotated[float, 0.1, 5] = 1.0  # factor on its forces: wax takes hold of wax less than of paper
     dark_price: Annotated[float, 0, 4] = 0.3  # reluctance to go darker than the photo
     gap: Annotated[float, 0, 4] = 0.4  # tips of unwanted ground a line may cross

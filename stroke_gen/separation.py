@@ -69,10 +69,11 @@ def _soften(cells, aim, ground, same, crayons, pressures, a, b, grain, dull, to_
             level[n, i] = mean[n] / all_
 
 
-def plates(plan: Plan, now: Floats, turn: int, dark_price: float) -> dict[int, Floats]:
-    """Pressure (h, w) wanted of each crayon that is the `turn`-th layer of some surface, and what it adds.
+def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict[int, Floats]:
+    """Pressure (h, w) wanted of each crayon that is wanted at all.
 
-    now: what the sheet shows, linear (h, w, 3). turn 0 to LAYERS - 1.
+    now: what the sheet shows, linear (h, w, 3). turn: the layer that comes next, 0 to LAYERS - 1, with all that
+    come after it in mind; None when all have been laid, and each may be pressed once more.
     """
     scene, swatches = plan.scene, plan.swatches
     guide = scene.guide
@@ -88,15 +89,17 @@ def plates(plan: Plan, now: Floats, turn: int, dark_price: float) -> dict[int, F
 
     def surface(g: int) -> None:
         layers = plan.mixtures.layers[g]
-        left = layers[turn:][layers[turn:] >= 0]
+        left = layers[turn or 0 :]
+        left = left[left >= 0]
         if not left.size:
             return
         cells = where[first[g] : first[g + 1]]
         level = np.empty((left.size, cells.size), np.float32)
-        _soften(cells, aim, ground, turn == 0, left, FEW if left.size >= LAYERS else full, swatches.a, swatches.b,
+        _soften(cells, aim, ground, turn == 0, left, FEW if left.size >= (LAYERS if turn is not None else LAYERS - 1) else full, swatches.a, swatches.b,
                 swatches.grain, dull, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(dark_price), SHARP,
                 level)  # fmt: skip
-        levels[left[0], cells] = level[0]
+        for k, own in zip(left[: None if turn is None else 1], level, strict=False):
+            levels[k, cells] = own
 
     list(plan.pool.map(surface, range(len(plan.mixtures.layers))))
     used = [int(k) for k in np.flatnonzero(levels.any(1))]

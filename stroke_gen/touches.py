@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from . import analysis
 from .analysis import blur
 from .colour import TO_LAB, TO_LMS, cube_root, oklab
 from .jit import kernel, lean_kernel
-from .mixing import GRAIN_PRICE, clash
+from .mixing import BODY_PRICE, GRAIN_PRICE, HAIR_RAD, SKIN_RAD, clash, foreign
 from .params import Pass
 from .separation import Plan
 from .swatches import Swatches
@@ -20,6 +21,7 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 STRANGER_PRICE = 0.02  # what a crayon that the surface has not must gain more
 CLASH_PRICE = 0.25  # for a hue that opposes the photo's, times how far
+TONES = 6.0  # widths of the touch over which tones are compared
 UNASKED = np.float32(-0.05)
 
 _cube_root = kernel(cube_root)
@@ -103,12 +105,15 @@ def gains(
     return gain, best
 
 
-def wanted(plan: Plan, now: Floats, aim: Floats, coat: Pass, cells: float) -> dict[int, Floats]:
+def wanted(plan: Plan, now: Floats, coat: Pass, cells: float) -> dict[int, Floats]:
     """The pressure (h, w) wanted of each crayon that is wanted at all: one crayon at most in each place.
 
-    now: linear (h, w, 3); aim: OKLab (h, w, 3); cells: width of the tip.
+    Only shapes are touched up, not tones: the sheet is compared with the photo as it would look in the sheet's own
+    tones. now: linear (h, w, 3); cells: width of the tip.
     """
     scene, swatches = plan.scene, plan.swatches
+    tones = analysis.wide_blur(now, TONES * cells), analysis.wide_blur(scene.target, TONES * cells)
+    aim = oklab(blur(scene.target, coat.soften * 0.5 * cells)) + oklab(tones[0]) - oklab(tones[1])
     need = scene.detail >= coat.detail
     chosen = _worthiest(plan, now, aim, need, coat, cells)
     steps = np.log(swatches.pressures)
@@ -137,15 +142,18 @@ def _worthiest(
     plan: Plan, now: Floats, aim: Floats, need: NDArray[np.bool_], coat: Pass, cells: float
 ) -> NDArray[np.uint8]:
     """The crayon (h, w) that gains most, where neighbours agree over `coat.cohere` tips."""
-    swatches, label = plan.swatches, plan.scene.family
+    seen, swatches = plan.scene, plan.swatches
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
     own = np.stack([(plan.mixtures.layers == k).any(1) for k in range(len(swatches.names))])
+    body = (seen.skin, foreign(swatches, SKIN_RAD)), (seen.hair, foreign(swatches, HAIR_RAD))
     asked = cv2.dilate(need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells)))
 
     def worth(k: int) -> Floats:
         gain, _ = gains(now, aim, (0, 0), asked, swatches, k, coat)
         price = np.float32(CLASH_PRICE) * clash(hues[k], aim[..., 1:])
-        price += np.where(own[k][label], 0, np.float32(STRANGER_PRICE))
+        price += np.where(own[k][seen.family], 0, np.float32(STRANGER_PRICE))
+        for where, strange in body:
+            price += BODY_PRICE * strange[k] * where
         return blur(gain, 0.5 * coat.cohere * cells) - price
 
     return np.stack(list(plan.pool.map(worth, range(len(swatches.names))))).argmax(0).astype(np.uint8)
