@@ -30,6 +30,7 @@ BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
 DARKER = 0.16  # OKLab L by which a line is darker than what it bounds
 LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
+TAPER = 4.0  # tips over which a line begins and ends
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
 
@@ -50,8 +51,8 @@ class Lines:
         return Lines(self.points[at], first, self.contrast[at], self.worth[chosen])
 
 
-def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
-    """Outline strokes for a plan whose sheet shows `now` (h, w, 3), light crayons first."""
+def outlines(plan: Plan, now: Floats, inside: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
+    """Outline strokes for a plan whose sheet shows `now` (h, w, 3), `inside` its margin, light crayons first."""
     scene, box = plan.scene, plan.swatches
     if style.lines <= 0:
         return []
@@ -62,6 +63,7 @@ def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) ->
     if style.closed:  # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
         small = _means(_sample(scene.detail, lines.points), lines.first) > 0.45
         lines = _together(_areas(scene, scene.label, lightness, width), lines.only(np.flatnonzero(small)))
+    lines = lines.only(np.flatnonzero(_means(_sample(inside, lines.points), lines.first) > 0.98))
     order = np.argsort(-lines.worth, kind="stable")
     length = np.cumsum(np.diff(lines.first)[order])
     lines = lines.only(order[length <= style.lines * BUDGET * max(scene.detail.shape)])
@@ -70,9 +72,9 @@ def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) ->
     for k in sorted(set(crayon.tolist()), key=lambda k: -box.lightness()[k]):
         mine = np.flatnonzero(crayon == k)
         some = lines.only(mine)
-        level = np.clip(some.contrast / 0.25, 0.35, 1.0) * np.repeat(pressure[mine], np.diff(some.first))
+        level = np.clip(0.5 + some.contrast / 0.3, 0.5, 1.2) * np.repeat(pressure[mine], np.diff(some.first))
         paths = hand.Paths(some.points, level.astype(np.float32), np.zeros(len(level), np.int32), some.first)
-        strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng)
+        strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng, TAPER)
     return strokes
 
 

@@ -56,7 +56,7 @@ def _stages(plan: Plan, inside: Floats, style: Style, rng: np.random.Generator) 
     """The stages in drawing order."""
 
     def lines(now: Floats) -> list[Stroke]:
-        return contours.outlines(plan, now, style, rng)
+        return contours.outlines(plan, now, inside, style, rng)
 
     if style.lines_first:
         yield lines
