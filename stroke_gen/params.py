@@ -53,6 +53,7 @@ class Style:
     crayons: Annotated[int, 1, 64] = 10  # most crayons taken out of the box
     merge: Annotated[float, 0.01, 1] = 0.06  # OKLab units by which two large surfaces must differ to be two
     open: Annotated[float, 0, 4] = 0.5  # how much wider the hatching of the ground is than the subject's
+    fade: Annotated[float, 0, 1] = 0.0  # care below which the ground is left out, in ragged strokes
     margin_mm: Annotated[float, 0, 50] = 2.0  # paper left along the sheet's border
     chroma: Annotated[float, 0, 3] = 1.0  # colourfulness asked for
     lift: Annotated[float, 0, 0.25] = 0.0  # middle tones drawn lighter than they are, as paper is lighter than a photo
@@ -67,6 +68,7 @@ class Style:
     flat: Annotated[float, 0, 1] = 0.0  # one pressure for all of a colour instead of following its tone
     fan_deg: Annotated[float, 0, 90] = 0.0  # spread of directions from one colour's areas to another's
     lines: Annotated[float, 0, 5] = 1.0  # amount of outline
+    search: Annotated[int, 1, 4] = 1  # how many times a line is drawn until it sits
     closed: bool = False  # outlines go round whole areas instead of along edges
     lines_first: bool = False  # outlines before the fill, as children draw; drawn once more at the end
     line_tip: Annotated[float, 0.2, 3] = 0.45  # width of the outline's tip, in usual tips
