@@ -25,7 +25,9 @@ STRONG = 0.14  # darkness of a face's features against what lies round them
 FINEST_MM = 0.5
 FIRM = (0.5, 1.0, 1.4, 2.0), (8.0, 5.0, 3.0, 2.0)  # widths in mm, and N/mm2 for their full darkness
 WOBBLE = 0.06  # widths
-AREAS = "iris", "lips", "white"
+AREAS = "iris", "lips", "white"  # drawn at the pressure that gives their colour
+FREE = "pupil", "frame", "symbol"  # in any crayon; other lines in those of skin
+RIDGE = 0.045  # darkness of a line that landmarks do not explain
 LEAST = 0.1  # pressure below which the hand lifts the crayon
 NOSE = (129, 102, 64, 98, 240, 60, 20, 2, 250, 290, 460, 327, 294, 331, 358)
 BRIDGE = (122, 196, 236, 198, 129), (351, 419, 456, 420, 358)
@@ -186,6 +188,8 @@ class _Sitter:
         self.eyes()
         for side in (0, 1):
             self.brow(side)
+        if self.eye >= FULL:
+            self.traces()
         return self.made
 
     # -- marks
@@ -231,20 +235,23 @@ class _Sitter:
 
     def eyes(self) -> None:
         """Both eyes; they share the colour of what shows of iris and white in either."""
-        seen = [one for side in (0, 1) if (one := self.looked_at(side))]
+        seen, colour, lit = self.looks()
         for lids in zip(subject.UPPER_LID, subject.LOWER_LID, strict=True):
             top, bottom = (self.face.path(lid) for lid in lids)
             self.lids(top, bottom)
-        if not seen:
-            return
-        ring, white = (np.concatenate([getattr(one, name) for one in seen]) for name in ("ring", "white"))
-        lit = np.median(white, 0) if len(white) > 3 else self.skin
-        colour = np.median(ring, 0) if len(ring) > 3 else self.skin * np.float32([0.5, 1, 1])
-        colour = _iris_colour(colour, lit)
         for one in seen:
             if self.eye >= FULL:
                 self.white(one, lit)
             self.iris(one, colour)
+
+    def looks(self) -> tuple[list["_Eye"], Floats, Floats]:
+        """The eyes that are open, the colour for their irises, and that of their whites."""
+        seen = [one for side in (0, 1) if (one := self.looked_at(side))]
+        ring = np.concatenate([one.ring for one in seen] or [np.empty((0, 3))])
+        white = np.concatenate([one.white for one in seen] or [np.empty((0, 3))])
+        lit = np.median(white, 0) if len(white) > 3 else self.skin
+        colour = np.median(ring, 0) if len(ring) > 3 else self.skin * np.float32([0.5, 1, 1])
+        return seen, _iris_colour(colour, lit), lit
 
     def lids(self, top: Floats, bottom: Floats) -> None:
         wide, high = float(np.linalg.norm(top[0] - top[-1])), float(np.linalg.norm(top[4] - bottom[4]))
@@ -258,7 +265,8 @@ class _Sitter:
         if self.eye >= 18:  # lashes make it the heaviest line of a face
             weight = np.interp(np.linspace(0, 1, len(made)), [0, 0.35, 0.8, 1], [0.4, 1, 0.7, 0])
             shade = np.float32([0.22, *(0.4 * self.skin[1:])])
-            self.add(made + 0.03 * self.eye * up, 0.9 * weight, shade, self.fine, "lid")
+            weight *= np.interp(self.eye, [18, 40], [0.5, 0.9])
+            self.add(made + 0.03 * self.eye * up, weight, shade, self.fine, "lid")
         if self.eye >= FULL:
             self.line(bottom[1:-1], "lower lid", 0.07, 0.0, 3.2, 0.8, (0.2, 0.4))
             fold = top[1:-1] + (0.3 * high + 0.05 * wide) * up
@@ -342,18 +350,19 @@ class _Sitter:
         seen = self.lab[band & (dark > 0.4 * most)]
         colour = np.float32([np.quantile(seen[:, 0], 0.25), *np.median(seen[:, 1:], 0)])
         width = 0.75 * self.fine
-        for i in range(int(length / (0.38 * width))):
-            u, row = self.rng.uniform(0, 0.95), self.rng.uniform(-0.1, 0.65)
-            reach = 0.10 + 0.16 * u
-            lift = 0.75 - 0.65 * u
-            root = _between(low, high, u, row)
-            tip = _between(low, high, min(1.0, u + reach), min(row + lift, 1.05))
-            bend = 0.5 * (root + tip) + 0.12 * lift * up
-            path = curve(np.stack([root, bend, tip]))
-            found = sampled(dark, path)
-            level = min(1.0, 0.35 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
-            pressure = level * _taper(len(path), 0.2, 0.7)
-            self.add(path, pressure, colour, width, "brow")
+        number = int(length / (0.38 * width))
+        u, row = self.rng.uniform(0, 0.95, number), self.rng.uniform(-0.1, 0.65, number)
+        lift = 0.75 - 0.65 * u  # upright by the nose, lying down at the temple
+        root = _between(low, high, u, row)
+        tip = _between(low, high, np.minimum(1.0, u + 0.1 + 0.16 * u), np.minimum(row + lift, 1.05))
+        bend = 0.5 * (root + tip) + 0.12 * lift[:, None] * up
+        t = np.linspace(0, 1, max(5, int(0.25 * length / STEP)), dtype=np.float32)[:, None, None]
+        hairs = ((1 - t) ** 2 * root + 2 * t * (1 - t) * bend + t * t * tip).astype(np.float32)
+        found = sampled(dark, hairs.reshape(-1, 2)).reshape(len(t), number)
+        level = min(1.0, 0.35 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
+        pressure = level * _taper(len(t), 0.2, 0.7)[:, None]
+        for i in np.argsort(u):
+            self.add(hairs[:, i], pressure[:, i], colour, width, "brow")
 
     def nose(self) -> None:
         self.line(self.face.path(NOSE), "nose", 0.09, 0.0, 4.5, 0.95, (0.1, 0.1), 1.2)
@@ -374,7 +383,7 @@ class _Sitter:
 
         def pressed(path: Floats) -> Floats:
             off = np.linalg.norm(sampled(self.near, path) - self.skin, axis=1)
-            return np.float32(np.clip(0.35 + 2 * off, 0, 0.85))
+            return np.float32(np.clip(0.22 + 2 * off, 0, 0.85))
 
         for top, bottom in bands:
             self.loft(top, bottom, "lips", width, pressed, colour)
@@ -406,6 +415,27 @@ class _Sitter:
         """Cheek and jaw, where the photo has an edge."""
         self.line(self.face.path(JAW), "jaw", 0.2, -0.1, 3, 1.1, (0.1, 0.1), 1.2)
 
+    def traces(self) -> None:
+        """What landmarks do not explain: glasses, beards, wrinkles that matter, strands over the forehead."""
+        dark = subject.soft(self.light, max(1.5, 0.12 * self.eye)) - self.light_near
+        oval = self.face.path(subject.OVAL)
+        done = 1 - subject.polygons([oval.mean(0) + 0.92 * (oval - oval.mean(0))], self.light.shape)
+        lids = [self.face.path((*a, *b[::-1])) for a, b in zip(subject.UPPER_LID, subject.LOWER_LID, strict=True)]
+        lips = [self.face.path((*subject.LIP_TOP, *subject.LIP_BOTTOM[::-1]))]
+        taken = (np.maximum(done, subject.polygons(lids + lips, done.shape)) > 0.3).astype(np.uint8)
+        for mark in self.made:
+            path = [np.round(mark.path).astype(np.int32)]
+            cv2.polylines(taken, path, False, 1, max(1, round(3.5 * mark.width)))
+        ridge = ((dark > RIDGE) & (taken == 0)).astype(np.uint8)
+        for chain in _chains(cv2.ximgproc.thinning(ridge * 255)):
+            if len(chain) < 0.5 * self.eye:
+                continue
+            path = curve(chain[:: max(1, len(chain) // 16)])
+            pressure = np.clip(4.5 * _smooth(sampled(dark, path), 5), 0, 0.9) * _taper(len(path), 0.2, 0.3)
+            colour = np.median(sampled(self.lab, path), 0) - np.float32([0.1, 0, 0])
+            tint = np.linalg.norm(colour[1:] - self.skin[1:] * max(0.5, colour[0] / self.skin[0]))
+            self.add(path, pressure, colour, self.fine, "frame" if tint > 0.06 else "trace")
+
     def blots(self) -> None:
         """Eyes and mouth of a face too small for features."""
         for side in (0, 1):
@@ -413,6 +443,31 @@ class _Sitter:
             self.line(0.5 * (top + bottom), "lid", 0.15, 0.5, 2, 1.0, (0.1, 0.1))
         lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
         self.line(lips, "mouth", 0.15, 0.3, 2, 1.0, (0.1, 0.1), 1.3)
+
+
+def _chains(thin: NDArray[np.uint8]) -> list[Floats]:
+    """Lines (n, 2) of cells along a thinned picture, each as straight on as it can go."""
+    left = set(map(tuple, np.argwhere(thin > 0).tolist()))
+    around = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
+
+    def beside(y: int, x: int) -> list[tuple[int, int]]:
+        return [(y + dy, x + dx) for dy, dx in around if (y + dy, x + dx) in left]
+
+    chains = []
+    for start in sorted(left, key=lambda cell: (len(beside(*cell)) != 1, cell)):
+        if start not in left:
+            continue
+        chain, heading = [start], (0, 0)
+        left.discard(start)
+        while ways := beside(*chain[-1]):
+            y, x = chain[-1]
+            step = max(ways, key=lambda w: (w[0] - y) * heading[0] + (w[1] - x) * heading[1])
+            back = chain[-min(4, len(chain))]
+            heading = step[0] - back[0], step[1] - back[1]
+            chain.append(step)
+            left.discard(step)
+        chains.append(np.float32(chain)[:, ::-1] + np.float32(0.5))
+    return chains
 
 
 def _iris_colour(seen: Floats, white: Floats) -> Floats:
@@ -426,7 +481,7 @@ def _iris_colour(seen: Floats, white: Floats) -> Floats:
     if np.cos(hue) > 0 or light < 0.3:
         hue = np.clip(hue, 0.8, 1.2)
     elif chroma > 0.02:
-        chroma = max(chroma, 0.13)
+        chroma = max(chroma, 0.1)
     return np.float32([light, chroma * np.cos(hue), chroma * np.sin(hue)])
 
 
@@ -443,10 +498,10 @@ def _unit(v: Floats) -> Floats:
     return np.asarray(v / (np.linalg.norm(v) + 1e-9), np.float32)
 
 
-def _between(low: Floats, high: Floats, u: float, v: float) -> Floats:
-    """A point of the band between two curves: u along it, v across it."""
-    a, b = (c[min(int(u * len(c)), len(c) - 1)] for c in (low, high))
-    return (1 - v) * a + v * b
+def _between(low: Floats, high: Floats, u: Floats, v: Floats) -> Floats:
+    """Points (n, 2) of the band between two curves: u along it, v across it."""
+    a, b = (c[np.minimum((u * len(c)).astype(int), len(c) - 1)] for c in (low, high))
+    return (1 - v[:, None]) * a + v[:, None] * b
 
 
 def _spiral(centre: Floats, outer: float, inner: float, gap: float) -> Floats:
@@ -463,19 +518,118 @@ def _disc(points: Floats, level: Floats, opening: Floats, wide: float) -> tuple[
     inner, outer = opening[n - 1], opening[0]
     middle = 0.5 * (opening[4] + opening[-5])
     across = _unit(opening[4] - opening[-5])
-    best, found = -np.inf, (middle, 0.2 * wide)
-    for share in np.linspace(-0.22, 0.22, 12):
-        for lift in np.linspace(-0.08, 0.1, 5):
-            centre = middle + share * (inner - outer) + lift * wide * across
-            far = np.linalg.norm(points - centre, axis=1) / wide
-            for radius in (0.18, 0.2, 0.22):
-                disc, round_it = far < radius, (far > 1.1 * radius) & (far < 1.6 * radius)
-                if disc.sum() < 3 or round_it.sum() < 3:
-                    continue
-                worth = level[round_it].mean() - level[disc].mean() - 0.4 * share**2 - 2 * lift**2
-                if worth > best:
-                    best, found = worth, (centre, radius * wide)
-    return np.float32(found[0]), float(found[1])
+    shares, lifts = np.meshgrid(np.linspace(-0.22, 0.22, 12), np.linspace(-0.08, 0.1, 5))
+    shares, lifts = shares.reshape(-1, 1), lifts.reshape(-1, 1)
+    centres = middle + shares * (inner - outer) + lifts * wide * across
+    far = np.linalg.norm(points - centres[:, None], axis=2) / wide
+    best = (-np.inf, middle, 0.2)
+    for radius in (0.18, 0.2, 0.22):
+        disc, ring = far < radius, (far > 1.1 * radius) & (far < 1.6 * radius)
+        means = [(part @ level) / np.maximum(part.sum(1), 1) for part in (ring, disc)]
+        worth = means[0] - means[1] - (0.4 * shares**2 + 2 * lifts**2)[:, 0]
+        worth[(disc.sum(1) < 3) | (ring.sum(1) < 3)] = -np.inf
+        best = max(best, (float(worth.max()), centres[worth.argmax()], radius), key=lambda one: one[0])
+    return np.float32(best[1]), best[2] * wide
+
+
+# ---- a child's faces -----------------------------------------------------------------------------
+
+
+def symbols(face: Face, lab: Floats, age: int, rng: np.random.Generator) -> list[Mark]:
+    """A face as a child of this age sets it down, at the right place and with the face's own mood.
+
+    At three two dots and a line; at five round eyes and a smile; at eight eyes with colour, brows, a nose
+    and lips; at ten lids, lashes and nostrils too.
+    """
+    return _Child(face, lab, age, rng).drawn()
+
+
+class _Child:
+    """One face, and the symbols made of it."""
+
+    def __init__(self, face: Face, lab: Floats, age: int, rng: np.random.Generator) -> None:
+        self.face, self.age, self.rng = face, age, rng
+        corners = [face.path(lid).mean(0) for lid in subject.UPPER_LID]
+        self.right = _unit(corners[1] - corners[0])
+        self.size = max(face.eye_width, 0.35 * float(np.linalg.norm(corners[1] - corners[0])))
+        self.width = max(2.0, float(np.interp(age, [3, 5, 8, 10], [0.3, 0.22, 0.16, 0.12])) * self.size)
+        _, self.colour, _ = _Sitter(face, lab, rng).looks()
+        self.made: list[Mark] = []
+
+    def add(self, path: Floats, colour: Sequence[float], width: float = 1.0) -> None:
+        shaky = float(np.interp(self.age, [3, 10], [0.09, 0.015])) * self.size
+        line = curve(np.asarray(path, np.float32), 1.0)
+        knots = self.rng.standard_normal((max(2, round(2.5 * len(line) / self.size)), 2))
+        at = np.linspace(0, len(knots) - 1, len(line))
+        line = line + shaky * np.stack([np.interp(at, np.arange(len(knots)), k) for k in knots.T], 1)
+        press = np.clip(0.8 + 0.1 * self.rng.standard_normal(), 0.6, 1) * _taper(len(line), 0.05, 0.1)
+        self.made.append(
+            Mark(np.float32(line), np.float32(press), np.float32(colour), width * self.width, "symbol")
+        )
+
+    def arc(self, middle: Floats, wide: float, high: float, begin: float, end: float) -> Floats:
+        """Part of an ellipse that lies as the face does; angles in turns, clockwise from the right."""
+        angle = 2 * np.pi * np.linspace(begin, end, 16)
+        down = np.float32([-self.right[1], self.right[0]])
+        return middle + np.outer(wide * np.cos(angle), self.right) + np.outer(high * np.sin(angle), down)
+
+    def drawn(self) -> list[Mark]:
+        for side in (0, 1):
+            self.eye(side)
+        self.nose()
+        self.mouth()
+        return self.made
+
+    def eye(self, side: int) -> None:
+        black, brown = (0.2, 0, 0), (0.32, 0.07, 0.08)
+        top, bottom = (self.face.path(lid[side]) for lid in (subject.UPPER_LID, subject.LOWER_LID))
+        middle, size = 0.5 * (top.mean(0) + bottom.mean(0)), self.size
+        if self.age < 5:
+            self.add(_spiral(middle, 0.2 * size, 0.02 * size, 0.6 * self.width), black)
+        elif self.age < 8:
+            self.add(self.arc(middle, 0.45 * size, 0.42 * size, 0.7, 1.75), black)
+            self.add(_spiral(middle, 0.15 * size, 0.02 * size, 0.6 * self.width), black)
+        else:
+            lid = 0.36 if self.age < 10 else 0.3
+            self.add(self.arc(middle, 0.55 * size, lid * size, 0.5, 1.0), black)
+            self.add(self.arc(middle, 0.55 * size, lid * size, 1.0, 1.5), black, 0.8)
+            self.add(_spiral(middle, 0.24 * size, 0.1 * size, 0.6 * self.width), self.colour)
+            self.add(_spiral(middle, 0.1 * size, 0.01, 0.5 * self.width), black)
+            brow = self.face.path(subject.BROW_TOP[side])
+            self.add(brow + 0.06 * (brow - middle), brown, 1.2)
+        if self.age >= 10:
+            for turn in (0.56, 0.65, 0.75, 0.85, 0.94):
+                lash = self.arc(middle, 1.0, 1.0, turn, turn)[:1] - middle
+                root = middle + lash * np.float32([0.5, 0.35]) * size
+                self.add(np.concatenate([root, root + 0.22 * size * lash]), black, 0.6)
+
+    def nose(self) -> None:
+        tip, below, brown = self.face.landmarks[4], self.face.landmarks[2], (0.42, 0.12, 0.14)
+        if self.age < 5:
+            return
+        if self.age < 8:
+            self.add(_spiral(tip, 0.1 * self.size, 0.02 * self.size, 0.6 * self.width), brown)
+        elif self.age < 10:
+            self.add(np.stack([self.face.landmarks[6], tip - 0.15 * self.size * self.right, below]), brown)
+        else:
+            self.add(self.face.path((193, 196, 236)), brown, 0.7)
+            self.add(self.arc(below, 0.4 * self.size, 0.16 * self.size, 0.0, 0.5), brown)
+            for nostril in (self.face.landmarks[[60, 99]].mean(0), self.face.landmarks[[290, 328]].mean(0)):
+                self.add(_spiral(nostril, 0.06 * self.size, 0.01, 0.3 * self.width), brown)
+
+    def mouth(self) -> None:
+        red = (0.55, 0.36, 0.18)
+        lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
+        bow = np.sin(np.linspace(0, np.pi, len(lips)))[:, None] * self.face.down
+        mood = float(((lips[5] - lips[[0, -1]].mean(0)) @ self.face.down) / self.face.height)
+        sag = (0.05 + np.clip(mood, -0.03, 0.04)) * self.face.height
+        wide = lips.mean(0) + np.float32([1.15 if self.age < 8 else 1.0]) * (lips - lips.mean(0))
+        if self.age < 8:
+            self.add(wide + (0.5 if self.age < 5 else 1.0) * sag * bow, red, 1.1)
+            return
+        self.add(self.face.path(subject.LIP_TOP), red)
+        self.add(self.face.path(subject.LIP_BOTTOM) + 0.2 * sag * bow, red)
+        self.add(wide + 0.4 * sag * bow, red if self.age < 10 else (0.3, 0.1, 0.05), 0.8)
 
 
 # ---- from marks to strokes -----------------------------------------------------------------------
@@ -507,6 +661,7 @@ def _crayon(mark: Mark, table: Floats) -> tuple[int, float]:
     off = (((table - mark.colour) * np.float32([1.2, 1, 1])) ** 2).sum(-1)
     if mark.role not in AREAS:
         off[:, :-1] = np.inf
+    if mark.role not in AREAS + FREE:
         light, hue = table[:, -1, 0], np.arctan2(table[:, -1, 2], table[:, -1, 1])
         chroma = np.hypot(table[:, -1, 1], table[:, -1, 2])
         skin = ((hue > 0.7) & (hue < 1.35) & (chroma < 0.22)) | ((chroma < 0.03) & (light < 0.35))
