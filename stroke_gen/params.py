@@ -69,6 +69,7 @@ class Style:
     lines: Annotated[float, 0, 5] = 1.0  # amount of outline
     closed: bool = False  # outlines go round whole areas instead of along edges
     lines_first: bool = False  # outlines before the fill, as children draw; drawn once more at the end
+    symbols: Annotated[int, 0, 10] = 0  # age of the child who sets faces down as symbols; 0: as they look
     line_tip: Annotated[float, 0.2, 3] = 0.45  # width of the outline's tip, in usual tips
     line_press: Annotated[float, 0.1, 5] = 1.0  # factor on the force of outlines
     passes: tuple[Pass, ...] = (Pass(),)

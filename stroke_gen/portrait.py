@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from . import subject
 from .colour import oklab
 from .drawing import Stroke, Tip
-from .subject import Face
+from .params import Style
+from .subject import Face, Subject
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
@@ -50,6 +51,31 @@ class Mark:
     width: float
     role: str
 
+    def within(self, inside: Floats) -> "list[Mark]":
+        """The pieces of the mark that lie where `inside` (h, w) has the paper drawn on."""
+        free = np.concatenate([[0], sampled(inside, self.path) > 0.5, [0]])
+        pieces = np.flatnonzero(np.diff(free)).reshape(-1, 2)
+        return [
+            replace(self, path=self.path[a:b], pressure=self.pressure[a:b]) for a, b in pieces if b - a > 1
+        ]
+
+
+def draw(
+    seen: Subject, lab: Floats, inside: Floats, box: Swatches, cell_mm: float, style: Style,
+    rng: np.random.Generator,
+) -> list[Stroke]:  # fmt: skip
+    """Strokes for all faces, as the style has them.
+
+    lab: the photo's own OKLab (h, w, 3) on the work grid.   inside: where paper may be drawn on (h, w).
+    """
+    made = []
+    for face in seen.faces:
+        if style.symbols:
+            made += symbols(face, lab, style.symbols, rng)
+        else:
+            made += marks(face, lab, rng)
+    return strokes([piece for mark in made for piece in mark.within(inside)], box, cell_mm, rng)
+
 
 def marks(face: Face, lab: Floats, rng: np.random.Generator) -> list[Mark]:
     """The marks of a face, in drawing order, from the photo's OKLab (h, w, 3) on the work grid."""
@@ -62,13 +88,23 @@ def marks(face: Face, lab: Floats, rng: np.random.Generator) -> list[Mark]:
     return [replace(mark, path=mark.path + corner) for mark in made]
 
 
-def spared(face: Face, shape: tuple[int, int]) -> Floats:
-    """What is kept free of the modelling's wax (h, w), 0..1: whites of eyes and teeth, which marks shade."""
-    if face.eye_width < FULL:
-        return np.zeros(shape, np.float32)
-    rings = list(zip(subject.UPPER_LID, subject.LOWER_LID, strict=True))
-    rings += [(subject.MOUTH_TOP, subject.MOUTH_BOTTOM)] if parted(face) else []
-    return subject.polygons([face.path((*top, *low[::-1])) for top, low in rings], shape)
+def kept(seen: Subject, shape: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
+    """What is left to portraits (h, w), 0..1: by all wax, by touches, by outlines.
+
+    Whites of eyes and teeth, which marks shade; eyes, brows and mouths; faces.
+    """
+    empty = np.zeros((3, *shape), np.float32)
+    large = [face for face in seen.faces if face.eye_width >= FULL]
+    if not large:
+        return empty[0], empty[1], empty[2]
+    rings = [(top, low) for lids in (zip(subject.UPPER_LID, subject.LOWER_LID, strict=True),) for top, low in lids]
+    whites = [face.path((*top, *low[::-1])) for face in large for top, low in rings]
+    whites += [
+        face.path((*subject.MOUTH_TOP, *subject.MOUTH_BOTTOM[::-1])) for face in large if parted(face)
+    ]
+    features = np.max([subject.features(face, shape) for face in large], 0)
+    ovals = subject.polygons([face.path(subject.OVAL) for face in large], shape)
+    return subject.polygons(whites, shape), subject.soft(features), ovals
 
 
 def parted(face: Face) -> bool:

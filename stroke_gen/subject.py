@@ -229,11 +229,11 @@ def skin(subject: Subject, lab: Floats) -> Floats:
     shape = lab.shape[0], lab.shape[1]
     out = np.zeros(shape, np.float32)
     for face in subject.faces:
-        oval, features = _oval(face, shape), _features(face, shape)
-        sample = lab[_oval(face, shape, 0.8) * (1 - features) > 0.7]
+        oval, own = _oval(face, shape), features(face, shape)
+        sample = lab[_oval(face, shape, 0.8) * (1 - own) > 0.7]
         like = _alike(lab, sample if len(sample) > MANY else lab[oval > 0.5])
         body = like * like * subject.mask * np.clip(2 - _far(face, shape) / (3 * face.height), 0, 1)
-        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like, 1), body) * (1 - features))
+        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like, 1), body) * (1 - own))
     return soft(out)
 
 
@@ -293,7 +293,7 @@ def _along(face: Face, shape: tuple[int, int]) -> Floats:
     return rows[:, None] * face.down[1] + cols * face.down[0]
 
 
-def _features(face: Face, shape: tuple[int, int]) -> Floats:
+def features(face: Face, shape: tuple[int, int]) -> Floats:
     """Eyes, brows and lips (h, w)."""
     rings = [
         *zip(UPPER_LID, LOWER_LID, strict=True),
