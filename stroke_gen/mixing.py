@@ -21,10 +21,11 @@ Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
 LAYERS = 4  # crayons in a mixture at most
 SAMPLES = 24  # colours by which a surface is judged
-GRAIN_PRICE = 0.3  # OKLab units per unit of grain
-LAYER_PRICE = 0.007  # for each further crayon
+GRAIN_PRICE = 0.5  # OKLab units per unit of grain
+LAYER_PRICE = 0.01  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
+LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
 DARK_PRICE = 0.12  # for a crayon darker than the surface's darkest, times the difference of lightness
 BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
 WARM = np.deg2rad(58)  # OKLab hue of both
@@ -193,6 +194,8 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
     price += GREY_PRICE * np.outer(np.maximum(chroma - 0.05, 0), greyness(heavy))
+    loud = np.linalg.norm(hue, axis=1)
+    price += LOUD_PRICE * np.maximum(loud[None] - 1.4 * chroma[:, None] - 0.1, 0)
     darkest = np.percentile(sample[:, 0], 10, axis=1)
     price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.15, 0)
     return price.astype(np.float32)
