@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analysis, contours, hand, hatching, margin, mixing, scene, separation, touches
+from . import analysis, contours, hand, hatching, margin, mixing, portrait, scene, separation, touches
 from .analysis import blur
 from .drawing import Stroke, Tip
 from .mixing import LAYERS
@@ -42,7 +42,7 @@ def generate(
         tip = style.tip_mm / seen.cell_mm
         inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, tip, rng)
         inside *= margin.faded(seen.care, style.fade, tip, style.wrist_deg, rng)
-        for stage in _stages(plan, inside, style, rng):
+        for stage in _stages(plan, swatches, inside, style, rng):
             fresh = hand.within(stage(look(seen.label.shape)), width_mm, height_mm)
             draw(fresh)
             strokes += fresh
@@ -51,23 +51,32 @@ def generate(
 
 def stages(style: Style) -> int:
     """How many times `generate` draws."""
-    return sum(LAYERS if coat.kind == "fill" else 1 for coat in style.passes) + 1 + style.lines_first
+    return sum(LAYERS if coat.kind == "fill" else 1 for coat in style.passes) + 2 + 2 * style.lines_first
 
 
-def _stages(plan: Plan, inside: Floats, style: Style, rng: np.random.Generator) -> Iterator[Stage]:
-    """The stages in drawing order."""
+def _stages(
+    plan: Plan, box: Swatches, inside: Floats, style: Style, rng: np.random.Generator
+) -> Iterator[Stage]:
+    """The stages in drawing order. box: all crayons; features of faces may take any."""
+    seen = plan.scene
+    white, features, ovals = portrait.kept(seen.subject, seen.label.shape)
 
     def lines(now: Floats) -> list[Stroke]:
-        return contours.outlines(plan, now, inside, style, rng)
+        return contours.outlines(plan, now, inside * (1 - ovals), style, rng)
+
+    def faces(now: Floats) -> list[Stroke]:
+        return portrait.draw(seen.subject, seen.natural, inside, box, seen.cell_mm, style, rng)
 
     if style.lines_first:
+        yield faces
         yield lines
     for coat in style.passes:
         if coat.kind != "touch":
             for turn in range(LAYERS) if coat.kind == "fill" else [None]:
-                yield lambda now, coat=coat, turn=turn: _fill(plan, now, inside, coat, turn, style, rng)
+                yield lambda now, coat=coat, turn=turn: _fill(plan, now, inside * (1 - white), coat, turn, style, rng)
         else:
-            yield lambda now, coat=coat: _touch(plan, now, inside, coat, style, rng)
+            yield lambda now, coat=coat: _touch(plan, now, inside * (1 - features), coat, style, rng)
+    yield faces
     yield lines
 
 

@@ -4,8 +4,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .analysis import wide_blur
+
 Floats = NDArray[np.float32]
-FRAYED = 0.35  # how far the fading goes to and fro, as a share of the care at which it happens
+NEAR = 0.12  # long sides over which what lies near the subject is drawn with it
+FRAYED = 0.3  # how far the fading goes to and fro, in powers of e of the nearness
 RAGGED = 0.45  # tips to and fro
 
 
@@ -24,11 +27,13 @@ def inside(shape: tuple[int, ...], margin: float, tip: float, rng: np.random.Gen
 def faded(care: Floats, fade: float, tip: float, wrist_deg: float, rng: np.random.Generator) -> Floats:
     """1 where the hand draws and 0 where the ground is left out (h, w), in streaks along the wrist's direction.
 
-    care: 0..1 (h, w); fade: care below which about half is left out.
+    care: 0..1 (h, w); fade: the share of the sheet that is left out, the farthest from where care is due.
     """
     if fade <= 0:
         return np.ones_like(care)
-    return (care > fade * (1 + FRAYED * _streaks(care.shape, tip, wrist_deg, rng))).astype(np.float32)
+    near = care + wide_blur(care, NEAR * max(care.shape)) + wide_blur(care, 3 * NEAR * max(care.shape))
+    near = np.log(near + 1e-3) + FRAYED * _streaks(care.shape, tip, wrist_deg, rng)
+    return (near > np.quantile(near[::2, ::2], fade)).astype(np.float32)
 
 
 def _streaks(shape: tuple[int, ...], cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:

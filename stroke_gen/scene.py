@@ -29,6 +29,7 @@ class Scene:
 
     target: Floats  # (h, w, 3) linear colours the drawing should show from afar
     lab: Floats  # (h, w, 3) the same as OKLab, chroma doubled
+    natural: Floats  # (h, w, 3) OKLab of the photo as it is
     guide: Guide  # calmed colours: what a thick crayon aims at
     label: NDArray[np.int32]  # (h, w) surface of each place
     family: NDArray[np.int32]  # (h, w) family of surfaces that are coloured alike
@@ -69,4 +70,4 @@ def read(
     coherence = np.hypot(field[..., 0], field[..., 1]) / (field[..., 2] + 1e-6)
     fine = np.clip(care * 1.5, 0, 1)[..., None]
     guide = Guide((calm * (1 - fine) + lab * fine).astype(np.float32), WINDOW * tip)
-    return Scene(target, lab, guide, label, family, tangent, coherence, subject, skin, hair, care, detail.result() * (0.35 + 0.65 * care), cell_mm)
+    return Scene(target, lab, natural, guide, label, family, tangent, coherence, subject, skin, hair, care, detail.result() * (0.35 + 0.65 * care), cell_mm)

@@ -173,7 +173,7 @@ def _oval(face: Face, shape: tuple[int, int], larger: float = 1.0, up: float = 0
     return polygons([middle + larger * (oval - middle) - up * face.height * face.down], shape)
 
 
-def _soft(level: Floats, sigma: float = 1.0) -> Floats:
+def soft(level: Floats, sigma: float = 1.0) -> Floats:
     """Gaussian blur, a wide one on coarser cells."""
     shrink = max(1, int(sigma / 2))
     small = _sized(level, (max(1, level.shape[0] // shrink), max(1, level.shape[1] // shrink)))
@@ -197,7 +197,7 @@ def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
     taken for the ellipse that fills it, and gives way to the photo's edges.
     """
     shape = lab.shape[0], lab.shape[1]
-    near = _soft(
+    near = soft(
         subject.mask, NEAR * max(shape)
     )  # what touches the subject is not quite left alone
     out = np.maximum(SUBJECT_CARE * subject.mask, 0.5 * near)
@@ -211,7 +211,7 @@ def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
         out = np.maximum(out, np.maximum(0.6 * ellipse, kept))
     for face in subject.faces:
         oval = _oval(face, shape, 1.05)
-        out = np.maximum(out, np.maximum(oval, _soft(_oval(face, shape, 1.2), 0.08 * face.height)))
+        out = np.maximum(out, np.maximum(oval, soft(_oval(face, shape, 1.2), 0.08 * face.height)))
     return out
 
 
@@ -229,12 +229,12 @@ def skin(subject: Subject, lab: Floats) -> Floats:
     shape = lab.shape[0], lab.shape[1]
     out = np.zeros(shape, np.float32)
     for face in subject.faces:
-        oval, features = _oval(face, shape), _features(face, shape)
-        sample = lab[_oval(face, shape, 0.8) * (1 - features) > 0.7]
+        oval, own = _oval(face, shape), features(face, shape)
+        sample = lab[_oval(face, shape, 0.8) * (1 - own) > 0.7]
         like = _alike(lab, sample if len(sample) > MANY else lab[oval > 0.5])
         body = like * like * subject.mask * np.clip(2 - _far(face, shape) / (3 * face.height), 0, 1)
-        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like, 1), body) * (1 - features))
-    return _soft(out)
+        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like, 1), body) * (1 - own))
+    return soft(out)
 
 
 def hair(subject: Subject, lab: Floats, bare: Floats) -> Floats:
@@ -245,14 +245,14 @@ def hair(subject: Subject, lab: Floats, bare: Floats) -> Floats:
     out = np.zeros(shape, np.float32)
     free = subject.mask * (1 - bare)
     for face in subject.faces:
-        head = _soft(_oval(face, shape, 1.75, 0.25), 0.08 * face.height) * (
+        head = soft(_oval(face, shape, 1.75, 0.25), 0.08 * face.height) * (
             1 - _oval(face, shape, 0.9)
         )
         forehead = _along(face, shape) < (face.path((33, 263)) @ face.down).mean()
         sample = lab[(_oval(face, shape, 1.3) - _oval(face, shape)) * free * forehead > 0.5]
         if len(sample) > MANY:
             out = np.maximum(out, head * free * _alike(lab, sample) ** 2)
-    return _soft(out)
+    return soft(out)
 
 
 def _alike(lab: Floats, sample: Floats) -> Floats:
@@ -293,7 +293,7 @@ def _along(face: Face, shape: tuple[int, int]) -> Floats:
     return rows[:, None] * face.down[1] + cols * face.down[0]
 
 
-def _features(face: Face, shape: tuple[int, int]) -> Floats:
+def features(face: Face, shape: tuple[int, int]) -> Floats:
     """Eyes, brows and lips (h, w)."""
     rings = [
         *zip(UPPER_LID, LOWER_LID, strict=True),
