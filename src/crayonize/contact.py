@@ -510,7 +510,7 @@ def _contact(w, wax, side, reach, present, x, y, force, vx, vy, stride, smears, 
         return np.float32(0)
     # The tip sinks until the paper bears the force.
     grip = one + constants.slip * _grip(np.int64(w.hand[BEGUN]), contact * stride / constants.slip_cells)
-    wanted = force * grip * per_lambda * inside
+    wanted = min(force * grip * per_lambda, constants.most * present) * inside
     cells = side * side
     allowed = min(constants.epsilon, np.float32(0.01) * wanted)
     h = _balance(w.over[:cells], wanted, np.float32(w.hand[HEIGHT]), allowed)

@@ -16,6 +16,7 @@ from stroke_gen.jit import kernel
 
 from . import area
 from .image_color import encode_srgb
+from .palette import FRONT
 from .wax import Sheet
 
 Floats = NDArray[np.float32]
@@ -23,6 +24,8 @@ Colour = tuple[float, float, float]
 T = TypeVar("T")
 
 LIGHT = 0.007  # change of brightness per 1/100 of slope, before saturation
+FILM_UM = 0.5  # a film so thin has half of its front surface: the rest is in gaps
+GLOSS = 6.0  # how much more the relief shows in what the surface reflects than in what comes through it
 BAND = 1 << 17  # cells rendered by one task
 
 
@@ -44,7 +47,7 @@ def _over(ground, kh, sh):  # type: ignore[no-untyped-def]
 
 @kernel
 def _render(  # type: ignore[no-untyped-def]
-    top, bottom, left, right, ground, light, paper, total, count, crayon, layer, blend, optics, cols, first, out
+    top, bottom, left, right, ground, light, surface, paper, total, count, crayon, layer, blend, optics, cols, first, out
 ):
     """Rows top..bottom, columns left..right of a sheet `cols` wide into out (n, cols, 3), which begins at `first`."""
     rows = count.size // cols
@@ -61,23 +64,30 @@ def _render(  # type: ignore[no-untyped-def]
                 h, wax = layer[cell, j], crayon[cell, j]
                 for c in range(3):
                     out[row, x, c] = _over(out[row, x, c], h * optics[wax, c], h * optics[wax, 3 + c])
+            front = surface * total[cell] / (total[cell] + np.float32(FILM_UM))
             if light > 0:
                 before = cell - (cols if y > 0 else 0) - (1 if x > 0 else 0)
                 after = cell + (cols if y < rows - 1 else 0) + (1 if x < cols - 1 else 0)
                 fall = (paper[before] - paper[after]) * np.float32(0.35) + total[before] - total[after]
                 shade = -fall * light
-                shade = np.float32(1) + shade / (np.float32(1) + abs(shade) * np.float32(12))
+                shade = shade / (np.float32(1) + abs(shade) * np.float32(12))
                 for c in range(3):
-                    out[row, x, c] = min(np.float32(1), out[row, x, c] * shade)
+                    out[row, x, c] *= np.float32(1) + shade
+                front *= np.float32(1) + np.float32(GLOSS) * shade
+            if front > 0:
+                for c in range(3):
+                    out[row, x, c] = front + (np.float32(1) - front) * out[row, x, c]
+            for c in range(3):
+                out[row, x, c] = min(np.float32(1), out[row, x, c])
 
 
 @kernel
 def _render_parts(  # type: ignore[no-untyped-def]
-    parts, ground, light, paper, total, count, crayon, layer, blend, optics, cols, first, out
+    parts, ground, light, surface, paper, total, count, crayon, layer, blend, optics, cols, first, out
 ):
     """Render parts (n, 4), each top, bottom, left, right."""
     for i in range(parts.shape[0]):
-        _render(parts[i, 0], parts[i, 1], parts[i, 2], parts[i, 3], ground, light, paper, total, count, crayon, layer,
+        _render(parts[i, 0], parts[i, 1], parts[i, 2], parts[i, 3], ground, light, surface, paper, total, count, crayon, layer,
                 blend, optics, cols, first, out)  # fmt: skip
 
 
@@ -137,5 +147,5 @@ def render_parts(
 ) -> None:
     """Renew parts (n, 4), each top, bottom, left, right in cells, of a picture `out` that begins at row `first`."""
     strength = np.float32(LIGHT * 0.1 / sheet.cell_mm * 0.5 if light else 0)
-    _render_parts(parts, np.array(ground, np.float32), strength, sheet.paper, sheet.total, sheet.count, sheet.crayon,
+    _render_parts(parts, np.array(ground, np.float32), strength, np.float32(FRONT), sheet.paper, sheet.total, sheet.count, sheet.crayon,
                   sheet.layer, sheet.blend, sheet.optics, sheet.cols, first, out)  # fmt: skip

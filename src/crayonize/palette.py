@@ -26,9 +26,12 @@ MAX_CRAYONS = 254
 MAX_FILE_BYTES = 1_000_000
 
 _DATA = Path(__file__).with_name("data") / "palettes"
-_DEFAULT_FILM_UM = 20.0
+_DEFAULT_FILM_UM = 15.0
 _HEX = re.compile(r"#[0-9a-fA-F]{6}")
 _MAX_NAME = 60
+
+FRONT = ((1.44 - 1) / (1.44 + 1)) ** 2  # of the light that meets wax its surface reflects (Fresnel; n of paraffin 1.44)
+_CLEAN = 0.5  # how much better than its hiding a crayon hides in a channel of reflectance 1/2
 
 # A crayon is never perfectly black or white in any channel; the inversion needs colours strictly between.
 _DARKEST, _LIGHTEST = 0.005, 0.985
@@ -384,11 +387,15 @@ def _shown(value: Any) -> str:
 
 
 def _colour_crayon(name: str, colour: str, hiding: float, film_um: float) -> Crayon:
-    """A crayon from its colour over white, Rw, and black, Rb = hiding Rw: R = Rb, T^2 = (Rw - Rb)(1 - Rb)."""
+    """A crayon from its colour over white, Rw, and black, Rb: R = Rb, T^2 = (Rw - Rb)(1 - Rb).
+
+    What its front surface reflects is taken off the colour. Rb is `hiding` Rw, and more in channels half bright:
+    there thick wax of even hiding would be much darker than its hex, and heavy red brown, which it is not.
+    """
     layers = []
     for value in _linear_of_hex(colour):
-        white = min(_LIGHTEST, max(_DARKEST, value))
-        black = hiding * white
+        white = min(_LIGHTEST, max(_DARKEST, (value - FRONT) / (1 - FRONT)))
+        black = white * (hiding + (1 - hiding) * _CLEAN * (1 - (1 - white) ** 6) * (1 - white**2 / 2))
         layers.append((black, math.sqrt((white - black) * (1 - black))))
     k, s = _per_um(layers, film_um)
     return Crayon(name, colour, k, s)

@@ -39,6 +39,7 @@ class Constants(NamedTuple):
     scatter: np.float32  # ... and how far each hop may differ from that, in cells
     slip: np.float32
     slip_cells: np.float32
+    most: np.float32  # mean overlap over the tip, um
     epsilon: np.float32  # um
     wear: np.float32
     thin: np.float32  # um
@@ -62,6 +63,7 @@ class Physics:
     alpha: float  # flow smear factor, per um
     beta: float  # directional smear factor
     lam: float  # N per um of overlap and mm^2 of contact: .0005 a cell of 0.1 mm
+    bears: float  # N per mm^2 of the tip that wax bears before it yields: no hand presses harder
     epsilon_um: float  # accuracy of the force, as a sum of overlaps over cells
     firm: float  # share of the wax's height that holds the crayon up; the rest yields to it (Fig. 4 has all hold: 1)
     heap: float  # share of a cell's wax that counts as out of reach: Fig. 6 rubs on the paper alone (1)
@@ -95,7 +97,7 @@ class Physics:
             "nu": 1 - (1 - self.nu) ** (cell_mm / self.nu_mm / longer), "alpha": self.alpha, "beta": self.beta,
             "yields": self.yields, "hop": hop, "scatter": scatter,
             "slip": self.slip, "slip_cells": self.slip_mm / cell_mm,
-            "epsilon": self.epsilon_um, "wear": self.wear, "thin": THIN_UM, "heap": self.heap, "firm": self.firm,
+            "most": self.bears / self.lam, "epsilon": self.epsilon_um, "wear": self.wear, "thin": THIN_UM, "heap": self.heap, "firm": self.firm,
         }  # fmt: skip
         return Constants(**{name: np.float32(value) for name, value in values.items()})
 
