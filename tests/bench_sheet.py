@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 
+import naive
 import numpy as np
 
-from crayonize import rub
-from crayonize.palette import Palette
-from crayonize.paper import Paper, tooth
-from crayonize.wax import Physics, Sheet
+from crayonize.crayons.palette import Palette
+from crayonize.wax import rub
+from crayonize.wax.paper import Paper, tooth
+from crayonize.wax.sheet import Physics, Sheet
 from stroke_gen.drawing import Stroke, Tip
 
 CRAYONS = {  # k and s per um, unlike in all channels
@@ -63,3 +64,20 @@ class Bench:
             crayon = str(rng.choice([c.name for c in self.palette.crayons]))
             strokes.append(self.stroke(path, um * float(rng.uniform(0.1, 2.5)), crayon, tip))
         return strokes
+
+
+def old_wax(sheet, rng, thickness=12.0):
+    """Cover a sheet with columns of every sort: bare, thin, many layers, a blend under four layers."""
+    for cell in range(sheet.rows * sheet.cols):
+        column = naive.Column(0.0)
+        for _ in range(rng.integers(0, 9)):
+            height = thickness * rng.random() ** 3
+            naive.add(column, int(rng.integers(len(sheet.optics))), height, sheet.optics)
+        if rng.random() < 0.3:
+            column.layers = []
+        sheet.count[cell] = len(column.layers)
+        for j, (crayon, height) in enumerate(column.layers):
+            sheet.crayon[cell, j], sheet.layer[cell, j] = crayon, height
+        sheet.blend[cell] = column.blend
+        sheet.total[cell] = column.wax()
+    return sheet

@@ -3,8 +3,8 @@
 import pytest
 from bench_sheet import CRAYONS, Bench
 
-from crayonize import rub
-from crayonize.palette import Crayon, Palette
+from crayonize.crayons.palette import Crayon, Palette
+from crayonize.wax import rub
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crayonize.wax import LAYERS, THIN_UM, Sheet
+from crayonize.wax.sheet import LAYERS, THIN_UM, Sheet
 
 NEIGHBOURS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 

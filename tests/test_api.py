@@ -10,8 +10,9 @@ import pytest
 from PIL import Image
 
 import crayonize
-from crayonize import api, memory
-from crayonize.image_read import read_linear
+from crayonize import api
+from crayonize.images.read import read_linear
+from crayonize.machine import memory
 from stroke_gen.drawing import Drawing, Stroke, Tip, load_drawing
 
 CHOICES = {"size": 120, "sheet_mm": 60.0, "seed": 3, "threads": 2}
@@ -189,7 +190,7 @@ def test_a_photo_that_cannot_be_read_is_refused():
 def test_memory_is_looked_at_before_the_photo_is_read(photo, tmp_path, monkeypatch):
     Image.fromarray(photo).save(tmp_path / "photo.png")
     monkeypatch.setattr(memory, "available_bytes", lambda: 2_000_000_000)
-    monkeypatch.setattr("crayonize.image_read.read_linear", lambda *_: pytest.fail("began to read"))
+    monkeypatch.setattr("crayonize.images.read.read_linear", lambda *_: pytest.fail("began to read"))
     for image in (photo, Image.fromarray(photo), tmp_path / "photo.png"):
         with pytest.raises(ValueError, match=r"size: 20000 x \d+ cells need \d+\.\d GB of memory, 2\.0 GB are free"):
             crayonize.convert(image, size=20000)

@@ -8,8 +8,8 @@ import pytest
 import crayonize
 import stroke_gen
 from crayonize import cli
-from crayonize.palette import load_palette, palette_names
-from crayonize.paper import load_paper, papers
+from crayonize.crayons.palette import load_palette, palette_names
+from crayonize.wax.paper import load_paper, papers
 from stroke_gen.params import load_style, style_names
 
 

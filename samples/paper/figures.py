@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from crayonize.image_color import encode_srgb
-from crayonize.image_write import write_image
-from crayonize.palette import load_palette
-from crayonize.paper import colour_linear, load_paper
+from crayonize.crayons.palette import load_palette
+from crayonize.images.icc import encode_srgb
+from crayonize.images.write import write_image
 from crayonize.pipeline import Easel, draw, easel
+from crayonize.wax.paper import colour_linear, load_paper
 from stroke_gen.drawing import Drawing, Stroke, Tip, load_drawing
 
 PHYSICS, PALETTE = "rudolf2003", "rudolf2003"

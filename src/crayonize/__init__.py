@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .api import convert, draw
-    from .live import Live
     from .settings import Settings
+    from .wax.live import Live
 
 __version__ = "0.1.0"
 __all__ = ["Live", "Settings", "convert", "draw"]
@@ -29,7 +29,7 @@ def __getattr__(name: str) -> Any:
         from . import api
 
         api.workshop()  # first: it says where its kernels are kept
-        from .live import Live
+        from .wax.live import Live
 
         return Live
     if name == "Settings":

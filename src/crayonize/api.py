@@ -13,8 +13,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import __version__, cache, memory
-from .did_you_mean import did_you_mean, quoted
+from stroke_gen.checks import did_you_mean, quoted
+
+from . import __version__
+from .machine import folder as cache
+from .machine import memory
 from .settings import Settings
 
 if TYPE_CHECKING:
@@ -143,7 +146,7 @@ def check_outputs(
 
     ValueError for what is wrong with a path, PermissionError for a folder that may not be written to.
     """
-    from .image_write import file_format, same_file
+    from .images.write import file_format, same_file
 
     if out is not None:
         file_format(out)
@@ -173,7 +176,7 @@ def filming(
     if path is None:
         return nullcontext()
     workshop()
-    from . import timelapse
+    from .film import plan as timelapse
 
     cache.keep_kernels()
     return timelapse.Timelapse(path, seconds, show_tip, light)
@@ -183,8 +186,8 @@ def sketch(
     image: Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
-    from . import paper
-    from .image_read import measured, read_linear
+    from .images.read import measured, read_linear
+    from .wax import paper
 
     width, height, reading = measured(image)
     check_size(width, height, settings.size, settings.preview, photo=reading, filmed=watch is not None)
@@ -235,7 +238,7 @@ def load_strokes(
 
     from stroke_gen.drawing import load_drawing
 
-    from .svg_in import load_svg
+    from .svg.load import load_svg
 
     if Path(path).suffix.lower() == ".svg":
         return load_svg(path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say)
@@ -246,7 +249,7 @@ def load_strokes(
 def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None) -> list[Path]:
     """Pages that show how to draw a Drawing, as a .pdf or .png files; see steps.py."""
     workshop()
-    from . import steps
+    from .pages import steps
 
     return steps.save_steps(drawing, out, progress)
 
@@ -275,11 +278,11 @@ def finish(
     """
     from stroke_gen.drawing import save_drawing
 
-    from .image_write import write_image
+    from .images.write import write_image
 
     picture = easel.picture_srgb(light)
     if legend:
-        from .legend import with_legend
+        from .pages.legend import with_legend
 
         picture = with_legend(picture, drawing, easel, light=light)
     if out is not None:
@@ -288,7 +291,7 @@ def finish(
         write_image(out, picture, settings=told, dpi=dpi if dpi >= 1 else None, kept=kept)
     if strokes is not None:
         if Path(strokes).suffix.lower() == ".svg":
-            from .svg_out import save_svg
+            from .svg.save import save_svg
 
             save_svg(drawing, strokes)
         else:
@@ -333,7 +336,7 @@ def warm_up() -> None:
     from stroke_gen.drawing import Drawing
     from stroke_gen.params import style_names
 
-    from .live import Live
+    from .wax.live import Live
 
     y, x = np.mgrid[:8, :64] / np.float32(8)
     strip = np.stack([x / 8, y, 0.5 + 0.5 * np.sin(2 * x * y)], axis=-1)

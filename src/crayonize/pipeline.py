@@ -13,10 +13,12 @@ from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
 from stroke_gen.generate import generate
 
-from . import calibration, optics, paper, rub
-from .palette import Palette, load_palette
+from .crayons import calibration
+from .crayons.palette import Palette, load_palette
+from .light import optics
 from .settings import Settings
-from .wax import Sheet
+from .wax import paper, rub
+from .wax.sheet import Sheet
 
 Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from crayonize.image_color import encode_srgb
-from crayonize.image_read import read_linear
+from crayonize.images.icc import encode_srgb
+from crayonize.images.read import read_linear
 from crayonize.settings import Settings
 from stroke_gen.drawing import Drawing
 

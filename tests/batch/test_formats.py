@@ -10,8 +10,8 @@ import pytest
 from conftest import HERE, Desk, photo
 from PIL import Image
 
-from crayonize.metadata import kept_of
-from crayonize.page import fitted
+from crayonize.images.metadata import kept_of
+from crayonize.images.page import fitted
 from crayonize.settings import Settings
 
 EXIF_FOLDER, GPS_FOLDER = 0x8769, 0x8825

@@ -2,7 +2,7 @@
 
 import os
 
-from ..memory import BYTES_PER_CELL, OVERHEAD, available_bytes, decoding
+from ..machine.memory import BYTES_PER_CELL, OVERHEAD, available_bytes, decoding
 
 __all__ = ["SHARE", "available_bytes", "cores", "need", "workers"]
 

@@ -9,9 +9,10 @@ from typing import Any
 
 from PIL.Image import Exif
 
-from .. import api, metadata, page
-from ..image_read import open_picture
-from ..image_write import read_settings, same_file
+from .. import api
+from ..images import metadata, page
+from ..images.read import open_picture
+from ..images.write import read_settings, same_file
 from ..settings import Settings
 from . import memory
 from .job import Job, Outcome, Recipe
@@ -108,8 +109,8 @@ def _check(recipe: Recipe) -> None:
     """ValueError for a palette, paper, style or force that there is not."""
     from stroke_gen import params
 
-    from .. import paper, rub
-    from ..palette import load_palette
+    from ..crayons.palette import load_palette
+    from ..wax import paper, rub
 
     settings = recipe.settings
     load_palette(settings.palette)

@@ -14,7 +14,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from ..did_you_mean import printable
+from stroke_gen.checks import printable
+
 from .job import STATUSES, Job, Outcome
 
 _BAD = ("failed", "died", "timeout")

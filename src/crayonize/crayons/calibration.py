@@ -1,0 +1,162 @@
+"""The stroke generator's table of crayons, measured on the simulator itself.
+
+Every crayon is hatched at six pressures over five grounds (bare paper, and coats of a middle and the
+darkest crayon); a line per channel through "before, after" gives `a` and `b` of the table. The tables of
+the shipped palettes on the default paper are part of the package (`python -m crayonize.crayons.calibration` measures
+them anew); others are measured once and kept in the user's cache folder.
+"""
+
+import hashlib
+import io
+import itertools
+import os
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stroke_gen.drawing import Stroke, Tip
+from stroke_gen.swatches import Swatches
+
+from ..light import optics
+from ..machine import folder as cache
+from ..settings import Settings
+from ..wax import paper, rub
+from ..wax.sheet import Sheet
+from .palette import Palette, load_palette, palette_names
+
+PRESSURES = (0.04, 0.1, 0.2, 0.38, 0.62, 0.95)  # N/mm^2
+TIP = Tip("blunt", 2.4)
+SPACING = 0.62  # of the tip's width
+PATCH_MM, EDGE_MM = 11.0, 2.5  # a swatch, and what is left out of the mean around it
+CELL_MM = 297 / 1600
+SHIPPED = Path(__file__).parents[1] / "data" / "tables"
+
+
+def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
+    """Hatch and measure every crayon of a palette on a paper."""
+    crayons = palette.crayons
+    k = np.array([c.k for c in crayons], np.float32)
+    s = np.array([c.s for c in crayons], np.float32)
+    grounds = _grounds(palette)
+    rows, cols = len(grounds) * len(PRESSURES), len(crayons)
+    shape = (round(rows * PATCH_MM / CELL_MM), round(cols * PATCH_MM / CELL_MM))
+    sheet = Sheet(paper.tooth(sheet_paper, *shape, CELL_MM, 0), CELL_MM, k, s)
+    constants = rub.physics(physics)
+    base = paper.colour_linear(sheet_paper.colour)
+    coats = [
+        _hatching(row, col, ground[0], ground[1], 0)
+        for row in range(rows)
+        for col in range(cols)
+        if (ground := grounds[row // len(PRESSURES)])
+    ]
+    rub.rub(sheet, coats, rub.Box(palette, constants, CELL_MM), threads=threads)
+    before, _ = _means(optics.render(sheet, base, light=False, threads=threads), rows, cols)
+    top = [
+        _hatching(row, col, crayons[col].name, PRESSURES[row % len(PRESSURES)], 1)
+        for row in range(rows)
+        for col in range(cols)
+    ]
+    rub.rub(sheet, top, rub.Box(palette, constants, CELL_MM), threads=threads)
+    after, grain = _means(optics.render(sheet, base, light=False, threads=threads), rows, cols)
+    split = (len(grounds), len(PRESSURES), len(crayons), 3)
+    a, b = _fit(before.reshape(split), after.reshape(split))
+    grain = grain.reshape(split[:3])[0].T
+    names = tuple(c.name for c in crayons)
+    paper_colour = np.array(base, np.float32)
+    return Swatches(names, np.array(PRESSURES, np.float32), a, b, np.ascontiguousarray(grain), paper_colour)
+
+
+def _grounds(palette: Palette) -> list[tuple[str, float] | None]:
+    """Bare paper, a middle crayon light and heavy, the darkest crayon light and heavy."""
+    order = sorted(palette.crayons, key=lambda c: sum(c.k) / sum(c.s))
+    middle, dark = order[len(order) // 2].name, order[-1].name
+    return [None, (middle, PRESSURES[2]), (middle, PRESSURES[4]), (dark, PRESSURES[1]), (dark, PRESSURES[4])]
+
+
+def _hatching(row: int, col: int, crayon: str, pressure: float, turn: int) -> Stroke:
+    """A zigzag over one swatch; the second coat lies 25 degrees to the first."""
+    gap, half = SPACING * TIP.width_mm, PATCH_MM / 2
+    lines = np.arange(-half - 3 * gap, half + 3.01 * gap, gap)
+    ends = np.array([[-half, half], [half, -half]])[np.arange(lines.size) % 2].ravel()
+    zigzag = np.stack([ends, np.repeat(lines, 2)], 1)
+    angle = np.deg2rad(-50 + 25 * turn)
+    turned = zigzag @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    fine = np.concatenate([np.linspace(p, q, 12) for p, q in itertools.pairwise(turned)])
+    inside = fine[(np.abs(fine) <= half - 0.6).all(1)]
+    path = (inside + (np.array([col, row]) + 0.5) * PATCH_MM).astype(np.float32)
+    force = np.full(len(path), pressure * 0.785 * TIP.width_mm**2, np.float32)
+    return Stroke(path, force, crayon, TIP)
+
+
+def _means(picture: NDArray[np.float32], rows: int, cols: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Mean linear colour (rows, cols, 3) and grain (rows, cols) of the swatches."""
+    from stroke_gen.colour import oklab
+
+    mean = np.empty((rows, cols, 3), np.float32)
+    grain = np.empty((rows, cols), np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            y0, x0 = row * PATCH_MM + EDGE_MM, col * PATCH_MM + EDGE_MM
+            y1, x1 = y0 + PATCH_MM - 2 * EDGE_MM, x0 + PATCH_MM - 2 * EDGE_MM
+            part = picture[round(y0 / CELL_MM) : round(y1 / CELL_MM), round(x0 / CELL_MM) : round(x1 / CELL_MM)]
+            mean[row, col] = part.mean((0, 1))
+            grain[row, col] = oklab(part)[..., 0].std()
+    return mean, grain
+
+
+def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Line after = a * before + b per crayon, pressure and channel, exact on bare paper (grounds, p, k, 3)."""
+    bare_x, bare_y = before[0], after[0]
+    dx, dy = before[1:] - bare_x, after[1:] - bare_y
+    a = np.clip((dx * dy).sum(0) / np.maximum((dx * dx).sum(0), 1e-6), 0, 1)
+    b = np.maximum(bare_y - a * bare_x, 0)
+    return (np.ascontiguousarray(a.swapaxes(0, 1), np.float32), np.ascontiguousarray(b.swapaxes(0, 1), np.float32))
+
+
+def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
+    """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured now."""
+    name = f"{palette.name}-{_key(palette, sheet_paper, physics)}.npz"
+    if (SHIPPED / name).is_file():
+        return _unpacked((SHIPPED / name).read_bytes())
+    kept = cache.folder() / name
+    content = cache.read(kept)
+    if content is None:
+        content = _packed(measure(palette, sheet_paper, physics, threads))
+        cache.write(kept, content)
+    return _unpacked(content)
+
+
+def _key(palette: Palette, sheet_paper: paper.Paper, physics: str) -> str:
+    """Changes with whatever the measured colours depend on."""
+    what = repr((palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
+    return hashlib.sha256(what.encode()).hexdigest()[:12]
+
+
+def _packed(table: Swatches) -> bytes:
+    content = io.BytesIO()
+    a, b, grain = (m.astype(np.float16) for m in (table.a, table.b, table.grain))
+    names = np.array(table.names)
+    np.savez(content, names=names, pressures=table.pressures, paper=table.paper, a=a, b=b, grain=grain)
+    return content.getvalue()
+
+
+def _unpacked(content: bytes) -> Swatches:
+    with np.load(io.BytesIO(content)) as table:
+        names = tuple(str(n) for n in table["names"])
+        return Swatches(names, *(table[f].astype(np.float32) for f in ("pressures", "a", "b", "grain", "paper")))
+
+
+def ship(folder: Path = SHIPPED) -> None:
+    """Measure the tables that the package ships: every palette on the default paper."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.npz"):
+        old.unlink()
+    for name, *_ in palette_names():
+        box, sheet_paper, physics = load_palette(name), paper.load_paper(str(Settings.paper)), Settings.physics
+        table = _packed(measure(box, sheet_paper, physics, os.cpu_count() or 1))
+        (folder / f"{name}-{_key(box, sheet_paper, physics)}.npz").write_bytes(table)
+
+
+if __name__ == "__main__":
+    ship()

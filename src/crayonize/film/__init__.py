@@ -1,0 +1,1 @@
+"""A film of the drawing as it is made."""

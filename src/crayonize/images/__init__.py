@@ -1,0 +1,1 @@
+"""Picture files: photos become linear light, drawings become picture files."""

@@ -1,0 +1,1 @@
+"""The machine: the cache folder, compiled kernels, memory and cores."""

@@ -1,0 +1,1 @@
+"""The wax: a sheet of rough paper, tips that rub strokes onto it, and the order in which they do."""

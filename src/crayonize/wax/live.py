@@ -1,0 +1,199 @@
+"""Drawing by hand: a crayon on an open sheet, segment by segment, and what of the picture each one changes.
+
+The kernels are those of `rub`, and so is the wax: strokes drawn here, saved, and drawn again come out the same.
+One thing `rub` knows that a hand does not tell when it puts the crayon down: which way the whole stroke goes,
+along which the tip's grooves lie (`rub.HEADINGS`). So the first half millimetre is waited for, and its way is
+taken. A stroke that bends later on may have its grooves turned a little when it is drawn again.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stroke_gen.drawing import Drawing, Stroke, Tip, check_drawing
+
+from .. import api
+from ..images.icc import encode_srgb
+from ..light import optics
+from ..pipeline import Easel
+from ..settings import Settings
+from .contact import _lift, _move, _press, window
+from .rub import STEP, _points, _ways, surroundings
+
+SETTLE_MM = 0.5  # length from which a stroke's heading is taken
+MARGIN = 2  # cells around a tip: one whose light changes with its neighbour's height, one for rounding
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A part of the picture as it is now: pixels (h, w, 3), uint8 sRGB, from row `top` and column `left` on.
+
+    If nothing has changed, h and w are 0.
+    """
+
+    top: int
+    left: int
+    pixels: NDArray[np.uint8]
+
+
+class Live:
+    """A sheet to draw on by hand: `press` a crayon on it, `move` it any number of times, `lift` it.
+
+    x and y are in mm on the sheet, force is in newton; all are taken to a thousandth, as a drawing's file has
+    them. ValueError, one line, for numbers that no drawing may hold, unknown crayons and calls out of order.
+    Made for one thread.
+    """
+
+    def __init__(
+        self, drawing: Drawing, size: int = Settings.size, *, light: bool = True, threads: int | None = None
+    ) -> None:
+        """drawing: says the sheet, its paper and its crayons; strokes that it has are drawn first.
+
+        size: of the picture's long side in pixels.   light: shade the relief.   threads: for those first strokes.
+        """
+        _, self.easel = api.redraw(drawing, size, threads)
+        self.light = light
+        self._drawing, self._strokes = drawing, list(drawing.strokes)
+        self._hand: _Hand | None = None
+        self._practise()
+
+    def press(
+        self, x_mm: float, y_mm: float, force_n: float, crayon: str, tip: Tip | None = None, note: str = "line"
+    ) -> None:
+        """Put a crayon on the paper. Nothing shows before it is moved or lifted."""
+        if self._hand:
+            raise ValueError("press: a crayon is on the paper; lift it first")
+        dab = Stroke(*_point(x_mm, y_mm, force_n), crayon, tip or Tip(), note)
+        self._check(dab, "press")
+        self._hand = _Hand(self.easel, dab)
+
+    def move(self, x_mm: float, y_mm: float, force_n: float) -> Change:
+        """Draw straight on to a point; the force changes evenly on the way."""
+        hand = self._held("move")
+        path_mm, force = _point(x_mm, y_mm, force_n)
+        self._check(replace(hand.dab, path_mm=path_mm, force_n=force), "move")
+        return self._change(hand, hand.move(path_mm, force))
+
+    def lift(self) -> Change:
+        """End the stroke; one that was too short to leave a mark becomes a dab."""
+        hand = self._held("lift")
+        self._hand = None
+        cells = hand.lift()
+        self._strokes.append(hand.stroke())
+        return self._change(hand, cells)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """The whole sheet, uint8 sRGB (rows, cols, 3)."""
+        return self.easel.picture_srgb(self.light)
+
+    def drawing(self) -> Drawing:
+        """All strokes so far, but for one under way: to be saved, or drawn again."""
+        return replace(self._drawing, strokes=tuple(self._strokes))
+
+    def _practise(self) -> None:
+        """Draw a line without any force, so that the first real ones need wait neither for kernels nor for memory."""
+        for array in self.easel.sheet.columns():
+            array[::1024] += 0  # memory comes page by page, each when it is first written to
+        hand = _Hand(self.easel, Stroke(*_point(0, 0, 0), self.easel.box.palette.crayons[0].name, Tip()))
+        self._change(hand, hand.move(*_point(1, 0, 0)))
+        hand.lift()
+
+    def _held(self, what: str) -> "_Hand":
+        if not self._hand:
+            raise ValueError(f"{what}: no crayon is on the paper; press one first")
+        return self._hand
+
+    def _check(self, dab: Stroke, where: str) -> None:
+        check_drawing(replace(self._drawing, strokes=(dab,)), where)
+
+    def _change(self, hand: "_Hand", cells: Floats) -> Change:
+        """What the tip reached on its way over points (n, 3) in cells."""
+        sheet, reach = self.easel.sheet, hand.side // 2 + MARGIN
+        top, left, bottom, right = 0, 0, 0, 0
+        if len(cells):
+            left, top = np.maximum(np.floor(cells[:, :2].min(0) - 0.5) - reach, 0).astype(int).tolist()
+            right, bottom = (np.floor(cells[:, :2].max(0) + 0.5) + reach + 1).astype(int).tolist()
+            right, bottom = min(right, sheet.cols), min(bottom, sheet.rows)
+        if top >= bottom or left >= right:
+            return Change(0, 0, np.empty((0, 0, 3), np.uint8))
+        band = np.empty((bottom - top, sheet.cols, 3), np.float32)
+        part = np.array([[top, bottom, left, right]])
+        optics.render_parts(sheet, self.easel.ground, part, band, first=top, light=self.light)
+        return Change(top, left, encode_srgb(band[:, left:right]))
+
+
+class _Hand:
+    """A crayon on the paper, and the stroke it has drawn so far."""
+
+    side = 0  # of the tip's window, in cells, once the heading is known
+
+    def __init__(self, easel: Easel, dab: Stroke) -> None:
+        """dab: a stroke of one point, where the crayon is put down."""
+        self.easel, self.dab = easel, dab
+        self._wax = np.uint8(easel.box.palette.index(dab.crayon))
+        self._around = surroundings(easel.sheet, easel.box, easel.smears)
+        self._path, self._force = [dab.path_mm], [dab.force_n]
+        self._drawn = 0  # number of the point up to which the stroke is drawn
+        self._given = 0.0  # wax, in um times cells
+
+    def stroke(self, since: int = 0) -> Stroke:
+        """The stroke, or what of it begins with one of its points."""
+        path_mm, force = np.concatenate(self._path[since:]), np.concatenate(self._force[since:])
+        return replace(self.dab, path_mm=path_mm, force_n=force)
+
+    def move(self, path_mm: Floats, force: Floats) -> Floats:
+        """Go on to a point; returns the points (n, 3) in cells over which it now was drawn, or none."""
+        self._path.append(path_mm)
+        self._force.append(force)
+        if not self.side:
+            points, first = _points([self.stroke()], self.easel.sheet.cell_mm)
+            if _ways(points, first)[1][0] * self.easel.sheet.cell_mm < SETTLE_MM:
+                return points[:0]
+            self._put_down()
+        return self._draw()
+
+    def lift(self) -> Floats:
+        """End the stroke; returns the points (n, 3) in cells around which it last drew."""
+        if not self.side:
+            self._put_down()
+        points = self._draw()
+        self._given += _lift(*self._tip, points[-1], *self._around)
+        self._book()
+        return points
+
+    def _put_down(self) -> None:
+        """Choose the tip for the way the stroke has begun, and press it on the sheet."""
+        box, cell_mm = self.easel.box, self.easel.sheet.cell_mm
+        stroke = self.stroke()
+        *_, self._heading = _ways(*_points([stroke], cell_mm))
+        taken, worn_um = box.take([stroke], np.zeros(1), self._heading)
+        mask = box.masks[taken[0]]
+        desk = window(mask.size, len(box.palette.crayons))
+        self.side = mask.shape[0]
+        present = _press(desk, mask.ravel(), worn_um[0], self.side, self.easel.sheet.cols)
+        self._tip = (desk, self._wax, self.side, box.reach, present)
+
+    def _draw(self) -> Floats:
+        """Draw on to the last point; returns in cells where the way began and all points passed."""
+        points, _ = _points([self.stroke(self._drawn)], self.easel.sheet.cell_mm)
+        for a, b in pairwise(points):
+            self._given += _move(*self._tip, a, b, np.float32(STEP), *self._around)
+        self._drawn = len(self._path) - 1
+        return points
+
+    def _book(self) -> None:
+        """Carry the stroke's wear on, and count its wax, as `rub` does."""
+        box, cell_mm, stroke = self.easel.box, self.easel.sheet.cell_mm, self.stroke()
+        newton_cells, _, _ = _ways(*_points([stroke], cell_mm))
+        box.take([stroke], newton_cells * cell_mm, self._heading)
+        box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + self._given * cell_mm**2 / 1000
+
+
+def _point(x_mm: float, y_mm: float, force_n: float) -> tuple[Floats, Floats]:
+    """A point as a path and its force, to the thousandth."""
+    with np.errstate(over="ignore"):  # beyond float32 is beyond any sheet, and refused as such
+        return np.array([[x_mm, y_mm]]).round(3).astype(np.float32), np.array([force_n]).round(3).astype(np.float32)

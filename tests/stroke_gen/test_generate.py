@@ -1,0 +1,335 @@
+"""The generator as a whole: any picture gives strokes that can be drawn, the same ones for the same seed."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from fake_box import PAPER, FlatSheet, box
+from skimage.color import deltaE_ciede2000, rgb2lab
+
+from crayonize.images.read import read_linear
+from crayonize.pipeline import draw, sketch
+from crayonize.settings import Settings
+from stroke_gen import analysis
+from stroke_gen.colour import oklab
+from stroke_gen.drawing import Drawing, check_drawing, load_drawing, save_drawing
+from stroke_gen.generate import generate
+from stroke_gen.params import load_style, style_names
+from stroke_gen.swatches import Swatches
+
+TABLE = box()
+LONG_MM = 72.0
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    """A work grid as coarse against the crayon as that of an A4 sheet."""
+    monkeypatch.setattr(analysis, "WORK_LONG", 155)
+
+
+def clouds(seed=0, shape=(60, 80)):
+    noise = np.random.default_rng(seed).random((*shape, 3)).astype(np.float32)
+    smooth = cv2.GaussianBlur(noise, (0, 0), 4)
+    return (smooth - smooth.min()) / (smooth.max() - smooth.min())
+
+
+def noise(*shape):
+    return np.random.default_rng(1).random((*shape, 3)).astype(np.float32)
+
+
+def waves(low, high, tint=(1, 1, 1)):
+    y, x = np.mgrid[:60, :80] / 20
+    level = low + (high - low) * (0.5 + 0.5 * np.sin(2 * x) * np.cos(1.7 * y))
+    return (level[..., None] * np.array(tint)).astype(np.float32)
+
+
+def line_art():
+    page = np.full((240, 320, 3), 255, np.uint8)
+    cv2.circle(page, (160, 120), 80, (0, 0, 0), 3)
+    cv2.line(page, (10, 10), (300, 220), (0, 0, 0), 3)
+    cv2.putText(page, "Wax", (40, 200), cv2.FONT_HERSHEY_SIMPLEX, 2, (0, 0, 0), 3)
+    return read_linear(page)
+
+
+def logo(ground):
+    """A red ring on nothing, laid on the paper's colour as `sketch` is to be given it."""
+    picture = np.zeros((100, 120, 4), np.uint8)
+    cv2.circle(picture, (60, 50), 38, (210, 30, 40, 255), -1)
+    cv2.circle(picture, (60, 50), 16, (0, 0, 0, 0), -1)
+    return read_linear(picture, None, ground)
+
+
+PICTURES = {
+    "1x1": noise(1, 1), "1x500": noise(1, 500), "500x1": noise(500, 1), "2x2": noise(2, 2), "tiny": noise(16, 16),
+    "white": np.ones((60, 80, 3), np.float32), "black": np.zeros((60, 80, 3), np.float32),
+    "grey": np.full((60, 80, 3), 0.2, np.float32), "noise": noise(150, 110), "lines": line_art(),
+    "logo": logo((1.0, 1.0, 1.0)), "logo on black": logo((0.012, 0.011, 0.012)), "fog": waves(0.5, 0.51),
+    "night": waves(0.0, 0.08, (0.6, 0.8, 1.0)), "high-key": waves(0.7, 1.0, (1.0, 0.98, 0.95)), "clouds": clouds(),
+}  # fmt: skip
+
+
+def sheet_mm(photo):
+    scale = LONG_MM / max(photo.shape[:2])
+    return max(1.0, photo.shape[1] * scale), max(1.0, photo.shape[0] * scale)
+
+
+def strokes_for(photo, style="artist", seed=0, table=TABLE, threads=2, **options):
+    style = load_style(style) if isinstance(style, str) else style
+    width, height = sheet_mm(photo)
+    sheet = FlatSheet(width, height, table)
+    hand = {"draw": sheet.draw, "look": sheet.look}
+    return generate(photo, width, height, table, style, seed, threads=threads, **hand, **options)
+
+
+def shown(photo, strokes, table=TABLE):
+    """What strokes show on a flat sheet."""
+    sheet = FlatSheet(*sheet_mm(photo), table)
+    sheet.look((90, 120))
+    sheet.draw(strokes)
+    return sheet.look((90, 120))
+
+
+def checked(strokes, photo):
+    """The strokes as a drawing that keeps the rules of the file."""
+    width, height = sheet_mm(photo)
+    drawing = Drawing(width, height, "drawing", "box24", tuple(strokes))
+    check_drawing(drawing, "drawing")
+    for stroke in strokes:
+        assert np.isfinite(stroke.path_mm).all() and np.isfinite(stroke.force_n).all()
+    return drawing
+
+
+def same(one, two):
+    return len(one) == len(two) and all(
+        a.crayon == b.crayon and a.tip == b.tip and a.note == b.note
+        and np.array_equal(a.path_mm, b.path_mm) and np.array_equal(a.force_n, b.force_n)
+        for a, b in zip(one, two, strict=True)
+    )  # fmt: skip
+
+
+# ---- any picture -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "style, name", [("artist", "1x500"), ("artist", "500x1"), *(("child", name) for name in PICTURES)]
+)
+def test_any_picture_gives_strokes_that_can_be_drawn(style, name):
+    photo = PICTURES[name]
+    checked(strokes_for(photo, style), photo)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_hand_is_held_back_on_a_thread_of_a_sheet(seed):
+    photo = PICTURES["500x1"]
+    checked(strokes_for(photo, replace(load_style("child"), overshoot=2.0), seed), photo)
+
+
+@pytest.mark.parametrize("style", style_names())
+def test_every_style_draws(style):
+    strokes = strokes_for(PICTURES["clouds"], style)
+    checked(strokes, PICTURES["clouds"])
+    assert {s.note for s in strokes} <= {coat.name for coat in load_style(style).passes} | {"line"}
+    assert len({s.crayon for s in strokes}) <= load_style(style).crayons
+    assert len(strokes) > 20
+
+
+@pytest.mark.parametrize("style", style_names())
+def test_white_stays_white(style):
+    assert strokes_for(PICTURES["white"], style) == []
+
+
+@pytest.mark.parametrize("style", style_names())
+def test_black_is_dark_everywhere(style):
+    photo = PICTURES["black"]
+    strokes = strokes_for(photo, style)
+    lightness = dict(zip(TABLE.names, TABLE.lightness(), strict=True))
+    assert strokes and all(lightness[s.crayon] < 0.5 for s in strokes)
+    light = shown(photo, strokes)
+    assert (oklab(light)[..., 0] < 0.6).mean() > 0.9
+    rim = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])
+    assert (oklab(rim)[:, 0] < 0.6).mean() > 0.8, "no pale frame"
+
+
+def test_paper_is_left_around_line_art():
+    photo = PICTURES["lines"]
+    light = oklab(shown(photo, strokes_for(photo)))[..., 0]
+    ink = (analysis.fit(photo, (90, 120))[..., 0] < 0.9).astype(np.uint8)
+    black = cv2.dilate(ink, np.ones((9, 9), np.uint8))
+    assert (light[black == 0] > 0.97 * oklab(PAPER)[0]).mean() > 0.95
+    assert light[black == 1].mean() < 0.85
+
+
+def test_logo_takes_the_paper_for_what_is_transparent():
+    photo = PICTURES["logo"]
+    light = shown(photo, strokes_for(photo))
+    lab = oklab(light)
+    assert np.allclose(light[2:8, 2:8], PAPER) and lab[45, 60, 0] > 0.9, "corners and the hole are bare"
+    assert lab[20, 60, 1] > 0.15, "the ring is red"
+
+
+def test_likeness_from_afar():
+    """The closed loop ends near its target on a sheet that does what the table says."""
+    photo = PICTURES["clouds"]
+    aim = analysis.read(photo, *sheet_mm(photo), TABLE, load_style("artist"), [], ThreadPoolExecutor(2)).target
+    target = analysis.far(analysis.fit(aim, (90, 120)))
+    off = [np.linalg.norm(analysis.far(shown(photo, strokes)) - target, axis=2).mean()
+           for strokes in ([], strokes_for(photo))]  # fmt: skip
+    assert off[1] < 0.35 * off[0]
+
+
+def test_on_dark_paper_lights_are_drawn_and_darks_left():
+    paper = np.array((0.012, 0.012, 0.012), np.float32)
+    dark = box(paper)
+    photo = np.tile(paper, (240, 320, 1))
+    photo[60:180, 100:220] = 0.9
+    for name in ("artist", "child"):
+        light = shown(photo, strokes_for(photo, replace(load_style(name), lift=0.0), table=dark), dark)
+        assert oklab(light)[30:60, 45:75, 0].mean() > 0.8
+        assert np.abs(light[3:15, 3:25] - paper).max() < 0.01
+
+
+def test_a_palette_of_a_hundred_crayons():
+    times = -(-100 // len(TABLE.names))
+    shades = np.random.default_rng(2).uniform(0.7, 1, (len(TABLE.names) * times, 1, 3)).astype(np.float32)
+    many = Swatches(
+        tuple(f"crayon {i}" for i in range(len(shades))), TABLE.pressures, np.tile(TABLE.a, (times, 1, 1)),
+        np.tile(TABLE.b, (times, 1, 1)) * shades, np.tile(TABLE.grain, (times, 1)), TABLE.paper,
+    )  # fmt: skip
+    checked(strokes_for(PICTURES["clouds"], table=many), PICTURES["clouds"])
+
+
+def test_a_single_crayon():
+    only = TABLE.only([TABLE.names.index("blue")])
+    assert {s.crayon for s in strokes_for(PICTURES["clouds"], table=only)} == {"blue"}
+
+
+# ---- the same and not the same -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("style", style_names())
+def test_same_seed_same_strokes_with_any_number_of_threads(style):
+    first = strokes_for(PICTURES["clouds"], style, threads=1)
+    before = cv2.getNumThreads()
+    try:
+        for threads, cv_threads in ((2, 1), (4, 4)):
+            cv2.setNumThreads(cv_threads)
+            assert same(first, strokes_for(PICTURES["clouds"], style, threads=threads))
+    finally:
+        cv2.setNumThreads(before)
+
+
+def test_other_seed_other_strokes_of_the_same_picture():
+    one, other = strokes_for(PICTURES["clouds"], seed=0), strokes_for(PICTURES["clouds"], seed=1)
+    assert not same(one, other)
+    assert 0.6 < len(one) / len(other) < 1.7
+    apart = analysis.far(shown(PICTURES["clouds"], one)) - analysis.far(shown(PICTURES["clouds"], other))
+    assert np.linalg.norm(apart, axis=2).mean() < 0.08
+
+
+def test_saving_and_loading_changes_no_stroke(tmp_path):
+    style = replace(load_style("child"), tip_mm=4.2345, line_tip=0.337)
+    strokes = strokes_for(PICTURES["clouds"], style)
+    save_drawing(checked(strokes, PICTURES["clouds"]), tmp_path / "d.json")
+    assert same(strokes, load_drawing(tmp_path / "d.json").strokes)
+
+
+def test_strokes_come_coat_by_coat_and_light_before_dark():
+    style = load_style("artist")
+    strokes = strokes_for(PICTURES["clouds"])
+    order = [*(coat.name for coat in style.passes), "line"]
+    coats = [order.index(s.note) for s in strokes]
+    assert coats == sorted(coats) and len(set(coats)) >= 4
+    lightness = dict(zip(TABLE.names, TABLE.lightness(), strict=True))
+    for coat in range(len(order)):
+        light = [lightness[s.crayon] for s, c in zip(strokes, coats, strict=True) if c == coat]
+        assert np.diff(light).max(initial=-1) <= 1e-6, order[coat]
+
+
+def test_a_coat_is_pressed_as_hard_as_it_says():
+    style = load_style("artist")
+    soft, hard = (
+        strokes_for(PICTURES["clouds"], replace(style, passes=(replace(style.passes[0], press=press),), lines=0.0))
+        for press in (1.0, 1.5)
+    )
+    assert len(soft) > 20
+    for one, two in zip(soft, hard, strict=True):
+        assert np.array_equal(one.path_mm, two.path_mm)
+        np.testing.assert_allclose(two.force_n, (1.5 * one.force_n).clip(0.02, 60), atol=0.011)
+
+
+def test_focus_draws_finer_there():
+    plain = PICTURES["grey"] + 0.1 * clouds(3)
+    sharp = []
+    for boxes in ([], [(0.0, 0.0, 0.5, 1.0)]):
+        left = [s for s in strokes_for(plain, focus=boxes) if s.path_mm[:, 0].mean() < LONG_MM / 2]
+        sharp.append(sum(s.tip.kind == "sharp" for s in left))
+    assert sharp[1] > 2 * sharp[0] + 5
+
+
+def test_strokes_stay_on_the_sheet():
+    """A hand may slip over the border of the sheet, but not further than its overshoot and half a line."""
+    for style in ("artist", "child"):
+        points = np.concatenate([s.path_mm for s in strokes_for(PICTURES["black"], style)])
+        over = np.maximum(-points, points - sheet_mm(PICTURES["black"])).max(1)
+        assert np.percentile(over, 99) < 2.5 and over.max() < 10, "mm"
+
+
+# ---- on real wax -------------------------------------------------------------------------------------------
+
+
+def drawn(photo, size=120, **changes):
+    return sketch(photo, Settings(size=size, sheet_mm=LONG_MM, **changes))
+
+
+@pytest.mark.parametrize("name", [n for n in PICTURES if n not in ("1x500", "500x1")])
+def test_any_picture_is_drawn_in_wax(name):
+    drawing, easel = drawn(PICTURES[name])
+    check_drawing(drawing, name)
+    light = easel.picture()
+    assert np.isfinite(light).all() and light.min() >= 0 and light.max() <= 1.2
+    if name == "white":
+        assert drawing.strokes == ()
+    if name == "black":
+        assert np.median(light) < 0.05
+
+
+@pytest.mark.parametrize("name", ["1x500", "500x1"])
+def test_a_thread_of_a_picture_is_drawn_in_wax(name):
+    check_drawing(drawn(PICTURES[name])[0], name)
+
+
+@pytest.mark.parametrize("style", style_names())
+def test_every_style_is_drawn_in_wax_the_same_again(style):
+    first, easel = drawn(PICTURES["clouds"], style=style, threads=1)
+    again, other = drawn(PICTURES["clouds"], style=style, threads=4)
+    assert same(first.strokes, again.strokes)
+    assert np.array_equal(easel.picture(), other.picture())
+
+
+@pytest.mark.parametrize("long_mm", [LONG_MM, 71.6543])
+def test_a_saved_drawing_gives_the_same_picture(tmp_path, long_mm):
+    drawing, easel = sketch(PICTURES["clouds"], Settings(size=120, sheet_mm=long_mm))
+    save_drawing(drawing, tmp_path / "d.json")
+    assert np.array_equal(draw(load_drawing(tmp_path / "d.json"), 120).picture(), easel.picture())
+
+
+def test_the_left_hand_hatches_the_other_way():
+    grey = PICTURES["grey"]
+    for left, expected in ((False, -50), (True, 50)):
+        strokes = drawn(grey, left_handed=left)[0].strokes
+        step = np.concatenate([np.diff(s.path_mm, axis=0) for s in strokes if s.note != "line"])
+        angle = 0.5 * np.degrees(np.angle(((step[:, 0] + 1j * step[:, 1]) ** 2).sum()))
+        assert abs(angle - expected) < 15
+
+
+def test_twice_the_size_is_the_same_picture_from_afar():
+    apart = []
+    for seed in (5, 6, 7):
+        photo = clouds(seed, (240, 320))
+        small, large = (drawn(photo, size=size)[1].picture(light=False) for size in (200, 400))
+        large = cv2.resize(large, small.shape[1::-1], interpolation=cv2.INTER_AREA)
+        seen = [rgb2lab(np.clip(cv2.GaussianBlur(p, (0, 0), 0.012 * 200), 0, 1) ** (1 / 2.2)) for p in (small, large)]
+        apart.append(deltaE_ciede2000(*seen).mean())
+    assert np.mean(apart) < 3.9
