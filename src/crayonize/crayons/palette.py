@@ -248,7 +248,7 @@ def _layer_crayon(data: dict[str, Any], film_um: float, layer_um: float, where: 
         )
     tints = [max(_DARKEST, _linear(value)) for value in colour]
     k, sc = _per_um([(s * tint, t * tint) for tint in tints], layer_um)
-    over_white = [_over_white(k[c] * film_um, sc[c] * film_um) for c in range(3)]
+    over_white = [FRONT + (1 - FRONT) * _over_white(k[c] * film_um, sc[c] * film_um) for c in range(3)]
     return Crayon(_crayon_name(data["name"], f"{where}.name"), _hex_of_linear(over_white), k, sc)
 
 
