@@ -13,7 +13,8 @@ import crayonize
 from crayonize import api
 from crayonize.images.read import read_linear
 from crayonize.machine import memory
-from stroke_gen.drawing import Drawing, Stroke, Tip, load_drawing
+from stroke_gen.drawing import Drawing, Stroke, Tip
+from stroke_gen.drawing_file import load_drawing
 
 CHOICES = {"size": 120, "sheet_mm": 60.0, "seed": 3, "threads": 2}
 

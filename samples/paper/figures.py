@@ -18,7 +18,8 @@ from crayonize.images.icc import encode_srgb
 from crayonize.images.write import write_image
 from crayonize.pipeline import Easel, draw, easel
 from crayonize.wax.paper import colour_linear, load_paper
-from stroke_gen.drawing import Drawing, Stroke, Tip, load_drawing
+from stroke_gen.drawing import Drawing, Stroke, Tip
+from stroke_gen.drawing_file import load_drawing
 
 PHYSICS, PALETTE = "rudolf2003", "rudolf2003"
 BLACK_PAPER = "lunar:#1c1b1d"

@@ -236,7 +236,7 @@ def load_strokes(
     """
     from dataclasses import replace
 
-    from stroke_gen.drawing import load_drawing
+    from stroke_gen.drawing_file import load_drawing
 
     from .svg.load import load_svg
 
@@ -276,7 +276,7 @@ def finish(
     settings: of the photo, to be noted in the picture beside what the drawing itself says.
     kept: tags of the photo that go into the picture, see metadata.py.   legend: with the crayons used.
     """
-    from stroke_gen.drawing import save_drawing
+    from stroke_gen.drawing_file import save_drawing
 
     from .images.write import write_image
 

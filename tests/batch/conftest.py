@@ -163,7 +163,7 @@ class Desk:
         again = self.run()
         assert again.process.returncode == 0, again.said
         assert again.count("ok") + again.count("skipped") == total
-        assert not list(self.pictures.rglob("*.part"))
+        assert not list(self.pictures.rglob("*.part*"))
         photos = tuple(tree(self.photos).items())
         if photos not in _CALM:
             self.run(output=self.base / "calm")

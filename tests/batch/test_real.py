@@ -72,7 +72,7 @@ def test_ctrl_c_in_the_midst_of_a_drawing(photos: Path, tmp_path: Path) -> None:
     assert time.monotonic() - begun < 2
     assert run.returncode == 130 and "Traceback" not in err
     assert json.loads(out.splitlines()[-1])["end"] == "stopped"
-    assert not list((tmp_path / "out").rglob("*.part"))
+    assert not list((tmp_path / "out").rglob("*.part*"))
     check_whole(tmp_path / "out")
 
 

@@ -258,7 +258,7 @@ GIMP = "GIMP Palette\n"
 BAD_FILES = [
     ("a.json", "", "a.json: line 1, column 1: not JSON"),
     ("a.json", '{"crayons": [\n  {"hex": "#ff0000",}]}', "a.json: line 2, column"),
-    ("a.json", "[1, 2]", 'a.json: a list is not an object like {"crayons"'),
+    ("a.json", "[1, 2]", 'a.json: a list of 2 is not an object like {"crayons"'),
     ("a.json", "[" * 100_000, "a.json: nested too deeply"),
     ("a.json", ONE % ('{"hex": "#ff0000", "hiding": 1' + "0" * 5000 + "}"), "thousands of digits"),
     ("a.json", ONE % '{"hex": "#ff0000", "hex": "#00ff00"}', 'the key "hex" stands twice'),
@@ -284,7 +284,7 @@ BAD_FILES = [
     ("a.json", '{"film_um": "9", "crayons": [{"hex": "#ff0000"}]}', 'film_um: "9" is not a number'),
     ("a.json", '{"film_um": true, "crayons": [{"hex": "#ff0000"}]}', "film_um: true is not a number"),
     ("a.json", '{"layer_films": 11, "crayons": [{}]}', "layer_films: 11 is not a number from 0.1 to 10"),
-    ("a.json", ONE % '{"name": "red", "rgb": [1, 0], "t": 0.5, "s": 0.1}', "rgb: a list is not a list"),
+    ("a.json", ONE % '{"name": "red", "rgb": [1, 0], "t": 0.5, "s": 0.1}', "rgb: a list of 2 is not a list"),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 2], "t": 0.5, "s": 0.1}', "rgb[2]: 2 is not a number"),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 0], "t": 0.5}', 'crayons[0]: "s" is missing'),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 0], "t": 0.5, "s": 0.6}', "t + s = 1.1"),
@@ -335,7 +335,7 @@ def test_bad_source_gets_one_clear_line(source: object, part: str) -> None:
 
 def test_pipe_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.json")
-    with pytest.raises(ValueError, match="not a regular file"):
+    with pytest.raises(ValueError, match="is no ordinary file"):
         load_palette(tmp_path / "pipe.json")
 
 

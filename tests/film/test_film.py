@@ -15,7 +15,8 @@ from crayonize.film import writers as film
 from crayonize.film.plan import Timelapse, pace
 from crayonize.images.icc import encode_srgb
 from crayonize.svg.load import load_svg
-from stroke_gen.drawing import Drawing, Stroke, Tip, save_drawing
+from stroke_gen.drawing import Drawing, Stroke, Tip
+from stroke_gen.drawing_file import save_drawing
 
 SIZE = 120
 

@@ -803,16 +803,16 @@ def test_the_final_name_appears_only_when_all_is_on_disk(tmp_path, monkeypatch):
     real = os.fsync
 
     def fsync(handle):
-        (part,) = os.listdir(tmp_path)
-        seen.append((part, os.fstat(handle).st_size))
+        (name,) = os.listdir(tmp_path)
+        seen.append((name, os.fstat(handle).st_size))
         real(handle)
 
-    monkeypatch.setattr(image_write.os, "fsync", fsync)
+    monkeypatch.setattr(os, "fsync", fsync)
     write_image(tmp_path / "out.png", noise(5, 6, 3))
-    ((part, size),) = seen
-    assert part.startswith(".crayonize-") and part.endswith(".part")
+    (part, size), (name, _) = seen
+    assert part.startswith(".crayonize-") and ".part" in part
     assert size == (tmp_path / "out.png").stat().st_size
-    assert os.listdir(tmp_path) == ["out.png"]
+    assert name == "out.png" and os.listdir(tmp_path) == ["out.png"]
 
 
 def test_output_through_a_link_spares_the_linked_file(tmp_path):

@@ -107,7 +107,7 @@ def test_folder_that_cannot_be_written_is_no_error(place, monkeypatch, code):
 
     monkeypatch.setattr(Path, "write_bytes", refuse)
     assert not loads(place)
-    assert not list(place.parent.rglob("*.part"))
+    assert not list(place.parent.rglob("*.part*"))
 
 
 def test_full_disk_leaves_no_half_entry(place, monkeypatch):

@@ -13,7 +13,7 @@ import pytest
 from crayonize.crayons.palette import load_palette
 from crayonize.images.read import read_linear
 from crayonize.pipeline import Easel, draw
-from stroke_gen.drawing import load_drawing
+from stroke_gen.drawing_file import load_drawing
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 CELL = 0.2  # mm

@@ -14,7 +14,8 @@ from crayonize.pipeline import draw, sketch
 from crayonize.settings import Settings
 from stroke_gen import analysis
 from stroke_gen.colour import oklab
-from stroke_gen.drawing import Drawing, check_drawing, load_drawing, save_drawing
+from stroke_gen.drawing import Drawing, check_drawing
+from stroke_gen.drawing_file import load_drawing, save_drawing
 from stroke_gen.generate import generate
 from stroke_gen.params import load_style, style_names
 from stroke_gen.swatches import Swatches

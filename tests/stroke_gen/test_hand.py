@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from stroke_gen import hand
-from stroke_gen.drawing import Drawing, Tip, load_drawing, save_drawing
+from stroke_gen.drawing import Drawing, Tip
+from stroke_gen.drawing_file import load_drawing, save_drawing
 from stroke_gen.hand import Paths
 from stroke_gen.params import Style, load_style
 

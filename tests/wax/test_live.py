@@ -9,7 +9,8 @@ from crayonize import api, pipeline
 from crayonize.images.icc import decode_srgb
 from crayonize.wax import rub
 from crayonize.wax.live import Live
-from stroke_gen.drawing import Drawing, Stroke, Tip, load_drawing, save_drawing
+from stroke_gen.drawing import Drawing, Stroke, Tip
+from stroke_gen.drawing_file import load_drawing, save_drawing
 
 SIZE = 240
 BLANK = Drawing(60.0, 40.0, "drawing", "box8", ())

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from stroke_gen.files import PART
+
 from . import lock
 from .job import Job
 from .journal import Journal
@@ -49,11 +51,11 @@ class OutputFolder:
         """Remove what killed runs left behind; while other shards may be at work, only what is old."""
         before = time.time() - _STALE if self._shard else None
         for folder in {os.path.dirname(job.target) for job in jobs}:
-            _remove_parts(folder, ".crayonize-", before)
+            _remove_parts(folder, PART, before)
 
     def clean_up(self, job: Job, pid: int) -> None:
         """Remove what a worker left behind that was killed at a job."""
-        _remove_parts(os.path.dirname(job.target), f".crayonize-{pid}-", None)
+        _remove_parts(os.path.dirname(job.target), f"{PART}{pid}-", None)
 
     def noted(self) -> None:
         """A line was added to the journal."""
@@ -65,7 +67,7 @@ class OutputFolder:
 def _remove_parts(folder: str, start: str, before: float | None) -> None:
     with suppress(OSError), os.scandir(folder) as listing:
         for entry in listing:
-            if entry.name.startswith(start) and entry.name.endswith(".part"):
+            if entry.name.startswith(start) and ".part" in entry.name:
                 with suppress(OSError):
                     if before is None or entry.stat().st_mtime < before:
                         os.unlink(entry.path)

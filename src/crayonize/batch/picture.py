@@ -1,7 +1,6 @@
 """One photo file becomes one picture file: what a worker does for a job."""
 
 import errno
-import os
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -80,7 +79,6 @@ class Studio:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             api.finish(drawing, easel, target, light=self._recipe.light, settings=settings, kept=kept)
-            _keep_name(target.parent)
         except OSError as error:
             if error.errno == errno.ENAMETOOLONG:
                 raise ValueError("the name of its picture is too long for this disk") from error
@@ -125,14 +123,3 @@ def _is_ours(path: Path) -> bool:
         return bool(read_settings(path))
     except ValueError:
         return False
-
-
-def _keep_name(folder: Path) -> None:
-    """Have the folder's new entry on disk before anybody notes that it is there."""
-    if os.name == "nt":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -121,7 +121,7 @@ def rubbing(side: int, repeats: int) -> Figures:
 
 def sheet(megapixels: float, folder: str, repeats: int) -> Figures:
     """Seconds per megapixel of each stage from photo to picture, and the memory a cell takes at most."""
-    from stroke_gen.drawing import save_drawing
+    from stroke_gen.drawing_file import save_drawing
 
     given, small = Path(folder) / f"{megapixels:g}.jpg", Path(folder) / "small.jpg"
     for path, mp in ((given, megapixels), (small, 0.01)):
@@ -142,7 +142,7 @@ def sheet(megapixels: float, folder: str, repeats: int) -> Figures:
 
 def threads(megapixels: float, folder: str, repeats: int) -> Figures:
     """How much sooner the strokes of `sheet` are drawn by several threads."""
-    from stroke_gen.drawing import load_drawing
+    from stroke_gen.drawing_file import load_drawing
 
     from .. import api
 

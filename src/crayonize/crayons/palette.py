@@ -13,13 +13,13 @@ import json
 import math
 import os
 import re
-import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from stroke_gen.checks import did_you_mean, printable, quoted
+from stroke_gen import checks, files
+from stroke_gen.checks import did_you_mean, of_kind, printable, quoted, shown
 
 DEFAULT_PALETTE = "box24"
 MAX_CRAYONS = 254
@@ -41,7 +41,6 @@ _COLOUR_KEYS = ("name", "hex", "hiding")
 _LAYER_KEYS = ("name", "rgb", "t", "s", "table2")
 
 RGB = tuple[float, float, float]
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def load_palette(source: "str | os.PathLike[str] | dict[str, Any] | Palette") ->
         return _from_object(source, "palette", "custom")
     if isinstance(source, os.PathLike):
         return _from_file(Path(source), printable(os.fspath(source)))
-    text = _as(str, source, "palette", "a name, a file, a list of colours or an object")
+    text = of_kind(str, source, "palette", "a name, a file, a list of colours or an object")
     if text in _shipped():
         return _from_file(_DATA / f"{text}.json", text)
     if text.lstrip().startswith("#"):
@@ -150,18 +149,10 @@ def _from_file(path: Path, where: str) -> Palette:
 
 
 def _text_of(path: Path, where: str) -> str:
-    """The text of a regular file of at most 1 MB. A pipe or device is refused before it can block."""
     try:
-        if not stat.S_ISREG(os.stat(path).st_mode):
-            raise OSError(0, "not a regular file")
-        with open(path, "rb") as file:
-            raw = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise ValueError(f"{where}: cannot be read ({error.strerror})") from error
+        raw = files.read_bytes(path, MAX_FILE_BYTES, "a palette file")
     except ValueError as error:
-        raise ValueError(f"{where}: cannot be read (a null byte in the name)") from error
-    if len(raw) > MAX_FILE_BYTES:
-        raise ValueError(f"{where}: larger than 1 MB, the most a palette file may have")
+        raise ValueError(f"{where}: {error}") from error
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -170,56 +161,32 @@ def _text_of(path: Path, where: str) -> str:
 
 
 def _from_json_text(text: str, where: str, stem: str) -> Palette:
-    try:
-        data = json.loads(text, object_pairs_hook=_object_without_repeats)
-    except json.JSONDecodeError as error:
-        raise ValueError(
-            f"{where}: line {error.lineno}, column {error.colno}: not JSON ({error.msg})"
-        ) from error
-    except RecursionError as error:
-        raise ValueError(f"{where}: nested too deeply to be a palette") from error
-    except _RepeatedKey as error:
-        raise ValueError(f"{where}: {error}") from error
-    except ValueError as error:
-        raise ValueError(f"{where}: a whole number with thousands of digits") from error
-    return _from_object(_as(dict, data, where, 'an object like {"crayons": [...]}'), where, stem)
-
-
-class _RepeatedKey(ValueError):
-    """The same key twice in one JSON object."""
-
-
-def _object_without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) < len(pairs):
-        keys = [key for key, _ in pairs]
-        twice = next(key for key in keys if keys.count(key) > 1)
-        raise _RepeatedKey(f"the key {quoted(twice)} stands twice in one object")
-    return made
+    data = of_kind(dict, checks.parsed_json(text, where, "palette"), where, 'an object like {"crayons": [...]}')
+    return _from_object(data, where, stem)
 
 
 def _from_object(data: dict[str, Any], where: str, stem: str) -> Palette:
-    _check_keys(data, _PALETTE_KEYS, where)
-    crayons = _as(list, data.get("crayons"), f"{where}: crayons", 'a list like [{"hex": "#ff0000"}]')
+    checks.keys(data, _PALETTE_KEYS, where)
+    crayons = of_kind(list, data.get("crayons"), f"{where}: crayons", 'a list like [{"hex": "#ff0000"}]')
     _check_count(len(crayons), where)
-    film_um = _number(data.get("film_um", _DEFAULT_FILM_UM), 0.1, 200.0, f"{where}: film_um")
-    layer_um = film_um * _number(data.get("layer_films", 1.0), 0.1, 10.0, f"{where}: layer_films")
-    name = _label(data["name"], f"{where}: name") if "name" in data else stem
+    film_um = checks.number(data.get("film_um", _DEFAULT_FILM_UM), 0.1, 200.0, f"{where}: film_um")
+    layer_um = film_um * checks.number(data.get("layer_films", 1.0), 0.1, 10.0, f"{where}: layer_films")
+    name = checks.text(data["name"], _MAX_NAME, f"{where}: name") if "name" in data else stem
     made = [_crayon(one, film_um, layer_um, f"{where}: crayons[{i}]") for i, one in enumerate(crayons)]
     places = [f"{where}: crayons[{i}].name" for i in range(len(made))]
     return Palette(
         name=name,
-        title=_label(data["title"], f"{where}: title") if "title" in data else name,
-        source=_label(data.get("source", ""), f"{where}: source", limit=1000),
+        title=checks.text(data["title"], _MAX_NAME, f"{where}: title") if "title" in data else name,
+        source=checks.text(data.get("source", ""), 1000, f"{where}: source"),
         film_um=film_um,
         crayons=_all_different(made, places),
     )
 
 
 def _crayon(given: Any, film_um: float, layer_um: float, where: str) -> Crayon:
-    data = _as(dict, given, where, 'an object like {"name": "red", "hex": "#ff0000"}')
+    data = of_kind(dict, given, where, 'an object like {"name": "red", "hex": "#ff0000"}')
     by_layer = "hex" not in data and "rgb" in data
-    _check_keys(data, _LAYER_KEYS if by_layer else _COLOUR_KEYS, where)
+    checks.keys(data, _LAYER_KEYS if by_layer else _COLOUR_KEYS, where)
     if by_layer:
         return _layer_crayon(data, film_um, layer_um, where)
     if "hex" not in data:
@@ -228,7 +195,7 @@ def _crayon(given: Any, film_um: float, layer_um: float, where: str) -> Crayon:
     name = _crayon_name(data.get("name", colour), f"{where}.name")
     if "hiding" not in data:
         return _colour_crayon(name, colour, default_hiding(colour), film_um)
-    return _colour_crayon(name, colour, _number(data["hiding"], 0.01, 0.99, f"{where}.hiding"), film_um)
+    return _colour_crayon(name, colour, checks.number(data["hiding"], 0.01, 0.99, f"{where}.hiding"), film_um)
 
 
 def _layer_crayon(data: dict[str, Any], film_um: float, layer_um: float, where: str) -> Crayon:
@@ -238,10 +205,10 @@ def _layer_crayon(data: dict[str, Any], film_um: float, layer_um: float, where: 
             raise ValueError(f"{where}: {quoted(key)} is missing, a crayon with rgb needs name, t and s")
     rgb = data["rgb"]
     if not isinstance(rgb, list) or len(rgb) != 3:
-        raise ValueError(f"{where}.rgb: {_shown(rgb)} is not a list of three numbers from 0 to 1")
-    colour = [_number(value, 0.0, 1.0, f"{where}.rgb[{i}]") for i, value in enumerate(rgb)]
-    t = _number(data["t"], 0.001, 0.999, f"{where}.t")
-    s = _number(data["s"], 0.001, 0.999, f"{where}.s")
+        raise ValueError(f"{where}.rgb: {shown(rgb)} is not a list of three numbers from 0 to 1")
+    colour = [checks.number(value, 0.0, 1.0, f"{where}.rgb[{i}]") for i, value in enumerate(rgb)]
+    t = checks.number(data["t"], 0.001, 0.999, f"{where}.t")
+    s = checks.number(data["s"], 0.001, 0.999, f"{where}.s")
     if t + s >= 1:
         raise ValueError(
             f"{where}: t + s = {t + s:g}, a layer cannot send out more light than it gets (below 1)"
@@ -261,7 +228,7 @@ def _from_gimp_text(text: str, where: str, stem: str) -> Palette:
     for number, line in enumerate(lines[1:], start=2):
         line = line.strip()
         if line.startswith("Name:"):
-            title = _label(line.removeprefix("Name:").strip(), f"{where}: line {number}") or stem
+            title = checks.text(line.removeprefix("Name:").strip(), _MAX_NAME, f"{where}: line {number}") or stem
         elif line and not line.startswith(("#", "Columns:")):
             found.append((f"{where}: line {number}", *_gimp_colour(line, f"{where}: line {number}")))
     return _from_colours(found, where, stem, title)
@@ -318,12 +285,6 @@ def _from_colours(found: Sequence[tuple[str, str, str]], where: str, stem: str, 
 # ---- checks ----------------------------------------------------------------------------------------------
 
 
-def _check_keys(data: dict[str, Any], valid: Sequence[str], where: str) -> None:
-    for key in data:
-        if key not in valid:
-            raise ValueError(f"{where}: unknown key {quoted(str(key))}{did_you_mean(str(key), valid)}")
-
-
 def _check_count(count: int, where: str) -> None:
     if not 1 <= count <= MAX_CRAYONS:
         raise ValueError(f"{where}: {count} crayons, a palette has 1 to {MAX_CRAYONS}")
@@ -340,47 +301,19 @@ def _all_different(crayons: Sequence[Crayon], places: Sequence[str]) -> tuple[Cr
 
 def _colour(value: Any, where: str) -> str:
     if not isinstance(value, str) or not _HEX.fullmatch(value):
-        raise ValueError(f"{where}: {_shown(value)} is not #rrggbb")
+        raise ValueError(f"{where}: {shown(value)} is not #rrggbb")
     return value.lower()
 
 
 def _crayon_name(value: Any, where: str) -> str:
-    name = _plain(_label(value, where))
+    name = _plain(checks.text(value, _MAX_NAME, where))
     if not name:
         raise ValueError(f'{where}: the name is empty, give one like "red"')
     return name
 
 
-def _label(value: Any, where: str, limit: int = _MAX_NAME) -> str:
-    if not isinstance(value, str) or not value.isprintable() or len(value) > limit:
-        raise ValueError(f"{where}: {_shown(value)} is not text of at most {limit} printable characters")
-    return value
-
-
-def _as(kind: type[T], value: Any, where: str, right: str) -> T:
-    if isinstance(value, kind):
-        return value
-    raise ValueError(f"{where}: {_shown(value)} is not {right}")
-
-
-def _number(value: Any, low: float, high: float, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise ValueError(f"{where}: {_shown(value)} is not a number from {low:g} to {high:g}")
-    return float(value)
-
-
 def _plain(name: str) -> str:
     return " ".join(name.split()).lower()
-
-
-def _shown(value: Any) -> str:
-    """A wrong value as a reader of the message would write it, short."""
-    if isinstance(value, str):
-        return quoted(value)
-    if isinstance(value, int) and abs(value) > 10**15:
-        return "a huge number"
-    kinds = {dict: "an object", list: "a list", type(None): "nothing"}
-    return kinds.get(type(value)) or str(value).lower()
 
 
 # ---- colour and wax --------------------------------------------------------------------------------------

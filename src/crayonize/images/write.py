@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
-import stat
-from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -14,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageCms, PngImagePlugin
+
+from stroke_gen.files import check_target, whole_file
 
 from .metadata import flat
 from .read import open_picture, shown
@@ -45,13 +44,11 @@ def write_image(
     The sRGB profile goes in, no time does.
     ValueError for what the caller can mend; OSError with the path if the disk is full or refuses.
     """
-    target, format_ = Path(os.fsdecode(path)), file_format(path)
-    _check_target(target)
+    format_ = file_format(path)
+    check_target(path)
     data = _encode(srgb8, format_, shown(path), settings or {}, dpi, quality, kept)
-    try:
-        _put(target, data)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror or str(error), os.fspath(target)) from error
+    with whole_file(path) as part:
+        part.write_bytes(data.getbuffer())
 
 
 def file_format(path: str | os.PathLike[str]) -> str:
@@ -92,18 +89,6 @@ def holds_other_picture(path: str | os.PathLike[str]) -> bool:
             return by != SOFTWARE
     except (OSError, ValueError):
         return False
-
-
-def _check_target(target: Path) -> None:
-    """Refuse what os.replace would fail on, or destroy: folders, devices, pipes."""
-    if not target.parent.is_dir():
-        raise ValueError(
-            f"{shown(target)}: the folder {shown(target.parent)} does not exist; create it first"
-        )
-    if os.path.lexists(target):
-        mode = os.lstat(target).st_mode
-        if not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
-            raise ValueError(f"{shown(target)}: stands for a folder or device; give the name of a file")
 
 
 def _encode(
@@ -179,18 +164,3 @@ def _srgb_profile() -> bytes:
     profile = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
     profile[24:36] = b"".join(n.to_bytes(2, "big") for n in (2000, 1, 1, 0, 0, 0))
     return bytes(profile)
-
-
-def _put(target: Path, data: BytesIO) -> None:
-    """Bytes to disk under a name of our own beside the target, then renamed: a fault leaves the old file."""
-    part = target.parent / f".{SOFTWARE}-{os.getpid()}-{secrets.token_hex(4)}.part"
-    try:
-        with open(part, "xb") as file:
-            file.write(data.getbuffer())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, target)
-    except BaseException:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise

@@ -24,6 +24,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from stroke_gen.files import whole_file
+
 KEEP = 3  # latest versions of a compiled kernel, and latest machines or versions of numba
 IN_USE_S = 3600.0  # a folder used within this time is never cleaned up
 _JIT_OFF = "numba"  # our own value of CRAYONIZE_NO_CACHE: only numba's disk cache stays off
@@ -81,14 +83,11 @@ def read(path: Path) -> bytes | None:
 
 def write(path: Path, content: bytes) -> bool:
     """Keep an entry, whole or not at all; whether it is kept now."""
-    part = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
         path.parent.mkdir(mode=0o700, exist_ok=True)
-        part.write_bytes(hashlib.sha256(content).digest() + content)
-        part.replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            part.unlink()
+        with whole_file(path, durable=False) as part:
+            part.write_bytes(hashlib.sha256(content).digest() + content)
+    except (OSError, ValueError):
         return False
     return True
 

@@ -1,10 +1,10 @@
 """The elements of an SVG file by strangers: read within limits, without entities and without fetching anything."""
 
 import os
-import stat
 from dataclasses import dataclass, field
-from pathlib import Path
 from xml.parsers import expat
+
+from stroke_gen.files import read_bytes
 
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 100
@@ -32,15 +32,7 @@ def read_svg(path: str | os.PathLike[str]) -> Element:
 
 
 def _bytes(path: str | os.PathLike[str]) -> bytes:
-    try:
-        if not stat.S_ISREG(os.stat(path).st_mode):
-            raise ValueError("is no ordinary file")
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise ValueError(f"cannot be read ({error.strerror})") from error
-    if len(data) > MAX_BYTES:
-        raise ValueError(f"larger than {MAX_BYTES // 1_000_000} MB, the most an SVG file may have")
+    data = read_bytes(path, MAX_BYTES, "an SVG file")
     if data[:2] == b"\x1f\x8b":
         raise ValueError("is compressed (svgz); unpack it with gunzip first")
     return data
