@@ -30,7 +30,7 @@ class Columns(NamedTuple):
 
     paper: Floats
     total: Floats
-    count: NDArray[np.uint8]
+    used: NDArray[np.uint8]  # how many pure layers
     crayon: NDArray[np.uint8]  # LAYERS a cell
     layer: Floats  # LAYERS a cell
     blend: Floats  # BLEND a cell
@@ -166,9 +166,9 @@ def _wear(broken, wear, inflow, mask):  # type: ignore[no-untyped-def]
 @inner_kernel
 def _add(cell, wax, height, thin, columns):  # type: ignore[no-untyped-def]
     """Lay `height` of pure crayon `wax` on a column; films thinner than `thin` do not part two layers."""
-    count, crayon, layer = columns.count, columns.crayon, columns.layer
+    used, crayon, layer = columns.used, columns.crayon, columns.layer
     columns.total[cell] += height
-    base, n = _whole(cell * LAYERS), _whole(count[cell])
+    base, n = _whole(cell * LAYERS), _whole(used[cell])
     found = LAYERS
     for j in range(LAYERS):  # upwards and without branches, for which way they go could not be foretold
         parted = LAYERS if layer[base + j] >= thin else found
@@ -187,7 +187,7 @@ def _add(cell, wax, height, thin, columns):  # type: ignore[no-untyped-def]
         n -= 1
     crayon[base + n] = wax
     layer[base + n] = height
-    count[cell] = n + 1
+    used[cell] = n + 1
 
 
 @lean_kernel
@@ -215,7 +215,7 @@ def _settle(w, slots, home, thin, columns):  # type: ignore[no-untyped-def]
 def _take(w, cells, slots, at, cell, left, scale, columns):  # type: ignore[no-untyped-def]
     """Lift `left` um off the top of a column, as far as its pure layers go; returns what is missing, and slots."""
     crayon, layer = columns.crayon, columns.layer
-    base, n, kept = _whole(cell * LAYERS), np.int64(columns.count[cell]), 0
+    base, n, kept = _whole(cell * LAYERS), np.int64(columns.used[cell]), 0
     for down in range(LAYERS):
         j = LAYERS - 1 - down
         there = layer[base + j] if j < n else np.float32(0)
@@ -230,7 +230,7 @@ def _take(w, cells, slots, at, cell, left, scale, columns):  # type: ignore[no-u
         left -= part
         layer[base + j] = there - part
         kept += there > part
-    columns.count[cell] = kept
+    columns.used[cell] = kept
     return left, slots
 
 
@@ -485,7 +485,8 @@ def _grip(stroke, along):  # type: ignore[no-untyped-def]
     """
     step = np.int64(along)
     part = np.float32(along - step)
-    return np.float32(2) * ((np.float32(1) - part) * _luck(stroke + step) + part * _luck(stroke + step + 1)) - np.float32(1)
+    luck = (np.float32(1) - part) * _luck(stroke + step) + part * _luck(stroke + step + 1)
+    return np.float32(2) * luck - np.float32(1)
 
 
 @lean_kernel

@@ -92,13 +92,27 @@ class Physics:
         hop, scatter = self.hop(cell_mm)
         longer = hop * cell_mm / self.reach_mm  # the fewer hops it takes to be pushed as far
         values = {
-            "mu_paper": self.mu_paper, "mu_wax": self.mu_wax, "film": self.film_um,
-            "rate": self.rate_per_mm * cell_mm, "push": self.push, "relief": self.relief / (1000 * cell_mm),
-            "nu": 1 - (1 - self.nu) ** (cell_mm / self.nu_mm / longer), "alpha": self.alpha, "beta": self.beta,
-            "yields": self.yields, "hop": hop, "scatter": scatter,
-            "slip": self.slip, "slip_cells": self.slip_mm / cell_mm,
-            "most": self.bears / self.lam, "epsilon": self.epsilon_um, "wear": self.wear, "thin": THIN_UM, "heap": self.heap, "firm": self.firm,
-        }  # fmt: skip
+            "mu_paper": self.mu_paper,
+            "mu_wax": self.mu_wax,
+            "film": self.film_um,
+            "rate": self.rate_per_mm * cell_mm,
+            "push": self.push,
+            "relief": self.relief / (1000 * cell_mm),
+            "nu": 1 - (1 - self.nu) ** (cell_mm / self.nu_mm / longer),
+            "alpha": self.alpha,
+            "beta": self.beta,
+            "yields": self.yields,
+            "hop": hop,
+            "scatter": scatter,
+            "slip": self.slip,
+            "slip_cells": self.slip_mm / cell_mm,
+            "most": self.bears / self.lam,
+            "epsilon": self.epsilon_um,
+            "wear": self.wear,
+            "thin": THIN_UM,
+            "heap": self.heap,
+            "firm": self.firm,
+        }
         return Constants(**{name: np.float32(value) for name, value in values.items()})
 
 
@@ -120,8 +134,10 @@ class Sheet:
 
     def columns(self) -> Columns:
         """What the kernels take."""
-        crayon, layer, blend, optics = (a.reshape(-1) for a in (self.crayon, self.layer, self.blend, self.optics))
-        return Columns(self.paper, self.total, self.count, crayon, layer, blend, optics)
+        crayon, layer, blend = self.crayon.reshape(-1), self.layer.reshape(-1), self.blend.reshape(-1)
+        return Columns(
+            self.paper, self.total, self.count, crayon, layer, blend, self.optics.reshape(-1)
+        )
 
     def film_um(self) -> Floats:
         """Height of the wax (rows, cols) in um."""
