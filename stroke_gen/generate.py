@@ -15,7 +15,7 @@ from .params import Pass, Style
 from .scene import Scene
 from .separation import Plan
 from .subject import Subject
-from .swatches import Swatches
+from .swatches import Swatches, firmness
 
 Floats = NDArray[np.float32]
 CROSS = (0, -1, 1, -2)  # turns of the direction from layer to layer, in `cross`
@@ -123,13 +123,13 @@ def _hatched(
 ) -> list[Stroke]:  # fmt: skip
     """Hatching of (crayon, tip in usual tips, pressure (h, w)), in that order."""
     seen, names = plan.scene, plan.swatches.names
-    hold = replace(style, press=style.press * coat.press)
     jobs = list(zip(parts, rng.spawn(len(parts)), strict=True))
 
     def drawn(job: tuple[tuple[int, float, Floats], np.random.Generator]) -> list[Stroke]:
         (k, factor, want), own = job
         tip = Tip("sharp" if coat.sharp else "blunt", round(factor * style.tip_mm, 3))  # as the file rounds it
         cells = tip.width_mm / seen.cell_mm
+        hold = replace(style, press=style.press * coat.press * firmness(tip.width_mm))
         how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs,
                              coat.gap * cells, coat.single)  # fmt: skip
         paths = hatching.hatch(want, gaps, tangent, seen.coherence, how, own)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .colour import TO_LAB, TO_LMS, cube_root, oklab
 from .jit import inner_kernel, kernel
 from .scene import Scene
-from .swatches import Swatches
+from .swatches import COVERED, Swatches
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
@@ -64,8 +64,10 @@ def _lab(light, to_lms, to_lab, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def combine(ground, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price):  # type: ignore[no-untyped-def]
+def combine(ground, paper, covered, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price):  # type: ignore[no-untyped-def]
     """OKLab (choices, 3) and price of grain of every choice of pressures for crayons laid over a ground.
+
+    a, b: the table's lines over paper and over wax; covered: how far from `paper` a ground's light is when all waxed.
 
     crayons: lightest first; pressures: which of the table's, 0 for none, 1 for its first. Choices count the first
     crayon's pressure slowest. dull: (crayons of the box,) lightness of each laid heavily.
@@ -85,13 +87,16 @@ def combine(ground, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain
             if p < 0:
                 continue
             k = crayons[n]
-            through = (a[k, p, 0] + a[k, p, 1] + a[k, p, 2]) / 3
+            off = max(max(abs(light[0] - paper[0]), abs(light[1] - paper[1])), abs(light[2] - paper[2]))
+            waxed = min(off / covered, np.float32(1))
+            through = (a[0, k, p, 0] + a[0, k, p, 1] + a[0, k, p, 2]) / 3
             below = np.float32(0.2126) * light[0] + np.float32(0.7152) * light[1] + np.float32(0.0722) * light[2]
             # Flecks below are covered by as much as the crayon hides; its own show by how far it differs.
             depth = abs(np.sqrt(below) - dull[k]) / (np.float32(1) - min(dull[k], np.float32(0.8)))
             dots = dots * through + grain[k, p] * min(depth, np.float32(1))
             for c in range(3):
-                light[c] = a[k, p, c] * light[c] + b[k, p, c]
+                bare, over = a[0, k, p, c] * light[c] + b[0, k, p, c], a[1, k, p, c] * light[c] + b[1, k, p, c]
+                light[c] = bare + waxed * (over - bare)
         _lab(light, to_lms, to_lab, colour[m])
         price[m] = grain_price * dots
 
@@ -113,7 +118,7 @@ def _cost(sample, colour, price, number):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _try(sample, mixtures, extra, allowed, paper, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, cost):  # type: ignore[no-untyped-def]
+def _try(sample, mixtures, extra, allowed, paper, covered, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, cost):  # type: ignore[no-untyped-def]
     """cost (surfaces, mixtures) of mixtures (m, n), with the prices `extra` (surfaces, crayons) of their crayons."""
     length = mixtures.shape[2]
     total = pressures.size**length
@@ -129,7 +134,7 @@ def _try(sample, mixtures, extra, allowed, paper, pressures, a, b, grain, dull, 
             if not usable:
                 cost[g, q] = 9
                 continue
-            combine(paper, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price)
+            combine(paper, paper, covered, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price)
             cost[g, q] = _cost(sample[g], colour, price, total) + dear
 
 
@@ -145,7 +150,7 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
 
     def tried(mixtures: Ints, allowed: NDArray[np.bool_], pressures: Ints) -> Floats:
         cost = np.empty(mixtures.shape[:2], np.float32)
-        _try(sample, mixtures, extra, allowed, swatches.paper, pressures, swatches.a, swatches.b, swatches.grain,
+        _try(sample, mixtures, extra, allowed, swatches.paper, np.float32(COVERED), pressures, swatches.a, swatches.b, swatches.grain,
              swatches.lightness(), TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), cost)  # fmt: skip
         return cost
 

@@ -16,7 +16,7 @@ from .scene import Scene
 from .colour import TO_LAB, TO_LMS
 from .jit import kernel
 from .mixing import FEW, GRAIN_PRICE, LAYERS, Mixtures, combine
-from .swatches import Swatches
+from .swatches import COVERED, Swatches
 
 Floats = NDArray[np.float32]
 SHARP = np.float32(1 / 0.012)  # how quickly a dearer choice loses its say, per OKLab unit
@@ -34,7 +34,7 @@ class Plan:
 
 
 @kernel
-def _soften(cells, aim, ground, same, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, dark_price,  # type: ignore[no-untyped-def]
+def _soften(cells, aim, ground, same, paper, covered, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, dark_price,  # type: ignore[no-untyped-def]
             sharp, level):  # fmt: skip
     """Level (layers, n) of each crayon for the cells (n,): 0 none, 1 the lightest pressure of the table, and so on.
 
@@ -47,7 +47,7 @@ def _soften(cells, aim, ground, same, crayons, pressures, a, b, grain, dull, to_
     for i in range(cells.size):
         at = cells[i]
         if i == 0 or not same:
-            combine(ground[at], crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price)
+            combine(ground[at], paper, covered, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price)
         least = np.float32(np.inf)
         for m in range(total):
             dl, da, db = colour[m, 0] - aim[at, 0], colour[m, 1] - aim[at, 1], colour[m, 2] - aim[at, 2]
@@ -95,8 +95,9 @@ def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict
             return
         cells = where[first[g] : first[g + 1]]
         level = np.empty((left.size, cells.size), np.float32)
-        _soften(cells, aim, ground, turn == 0, left, FEW if left.size >= (LAYERS if turn is not None else LAYERS - 1) else full, swatches.a, swatches.b,
-                swatches.grain, dull, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(dark_price), SHARP,
+        many = left.size >= (LAYERS if turn is not None else LAYERS - 1)
+        _soften(cells, aim, ground, turn == 0, swatches.paper, np.float32(COVERED), left, FEW if many else full,
+                swatches.a, swatches.b, swatches.grain, dull, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(dark_price), SHARP,
                 level)  # fmt: skip
         for k, own in zip(left[: None if turn is None else 1], level, strict=False):
             levels[k, cells] = own

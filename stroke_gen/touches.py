@@ -100,7 +100,7 @@ def gains(
     pressures = max(1, int((swatches.pressures <= coat.hardest).sum()))
     gain, best = np.full(need.shape, UNASKED, np.float32), np.zeros(need.shape, np.int8)
     weights = np.float32(coat.tone), np.float32(coat.dark_price), np.float32(GRAIN_PRICE)
-    table = (m[k, :pressures] for m in (swatches.a, swatches.b, swatches.grain))
+    table = (m[k, :pressures] for m in (swatches.a[1], swatches.b[1], swatches.grain))
     _gain(*corner, current, lab, need, *table, TO_LMS, TO_LAB, *weights, gain, best)
     return gain, best
 

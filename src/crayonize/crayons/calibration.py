@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.drawing import Stroke, Tip
-from stroke_gen.swatches import Swatches
+from stroke_gen.swatches import TIP_MM, Swatches
 
 from ..light import optics
 from ..machine import folder as cache
@@ -26,7 +26,7 @@ from ..wax.sheet import Sheet
 from .palette import Palette, load_palette, palette_names
 
 PRESSURES = (0.04, 0.1, 0.2, 0.38, 0.62, 0.95)  # N/mm^2
-TIP = Tip("blunt", 2.4)
+TIP = Tip("blunt", TIP_MM)
 SPACING = 0.62  # of the tip's width
 PATCH_MM, EDGE_MM = 11.0, 2.5  # a swatch, and what is left out of the mean around it
 CELL_MM = 297 / 1600
@@ -106,12 +106,18 @@ def _means(picture: NDArray[np.float32], rows: int, cols: int) -> tuple[NDArray[
 
 
 def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Line after = a * before + b per crayon, pressure and channel, exact on bare paper (grounds, p, k, 3)."""
-    bare_x, bare_y = before[0], after[0]
-    dx, dy = before[1:] - bare_x, after[1:] - bare_y
-    a = np.clip((dx * dy).sum(0) / np.maximum((dx * dx).sum(0), 1e-6), 0, 1)
-    b = np.maximum(bare_y - a * bare_x, 0)
-    return (np.ascontiguousarray(a.swapaxes(0, 1), np.float32), np.ascontiguousarray(b.swapaxes(0, 1), np.float32))
+    """Lines after = a * before + b per crayon, pressure and channel, from (grounds, p, k, 3): (2, k, p, 3) each.
+
+    The first goes exactly through what bare paper gave, the second through the means of the waxed grounds.
+    """
+    x, y = before[1:], after[1:]
+    lines = []
+    for through_x, through_y in ((before[0], after[0]), (x.mean(0), y.mean(0))):
+        dx, dy = x - through_x, y - through_y
+        a = np.clip((dx * dy).sum(0) / np.maximum((dx * dx).sum(0), 1e-6), 0, 1)
+        lines.append((a, np.maximum(through_y - a * through_x, 0)))
+    a, b = (np.stack(m).swapaxes(1, 2) for m in zip(*lines, strict=True))
+    return np.ascontiguousarray(a, np.float32), np.ascontiguousarray(b, np.float32)
 
 
 def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
@@ -129,7 +135,7 @@ def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: 
 
 def _key(palette: Palette, sheet_paper: paper.Paper, physics: str) -> str:
     """Changes with whatever the measured colours depend on."""
-    what = repr((palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
+    what = repr(("lines over paper and over wax", palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
     return hashlib.sha256(what.encode()).hexdigest()[:12]
 
 
