@@ -5,7 +5,7 @@ goes: every line settles on the darkness near it and is pressed as that darkness
 where the photo has none. Paths are in cells of the work grid, colours in OKLab with chroma doubled.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -26,8 +26,9 @@ STRONG = 0.14  # darkness of a face's features against what lies round them
 FINEST_MM = 0.5
 FIRM = (0.5, 1.0, 1.4, 2.0), (8.0, 5.0, 3.0, 2.0)  # widths in mm, and N/mm2 for their full darkness
 WOBBLE = 0.06  # widths
-AREAS = "iris", "lips", "white"  # drawn at the pressure that gives their colour
-FREE = "pupil", "frame", "symbol"  # in any crayon; other lines in those of skin
+AREAS = "lips", "white"  # drawn at the pressure that gives their colour
+WEIGHTS = {"iris": np.float32([0.6, 1.2, 1.2]), "": np.float32([1.2, 1, 1])}  # of L, a, b
+FREE = "iris", "pupil", "frame", "symbol"  # in any crayon; other lines in those of skin
 RIDGE = 0.045  # darkness of a line that landmarks do not explain
 LEAST = 0.1  # pressure below which the hand lifts the crayon
 NOSE = (129, 102, 64, 98, 240, 60, 20, 2, 250, 290, 460, 327, 294, 331, 358)
@@ -256,9 +257,12 @@ class _Sitter:
         self.add(path, pressure, colour, width * self.fine, role)
         return path
 
-    def loft(self, top: Floats, bottom: Floats, role: str, width: float, pressed, colour) -> None:
+    def loft(
+        self, top: Floats, bottom: Floats, role: str, width: float, pressed: Callable[[Floats], Floats],
+        colour: Floats, closeness: float = 0.75,
+    ) -> None:  # fmt: skip
         """Lines side by side from one curve to another; `pressed` maps points to pressure."""
-        gap = 0.75 * width
+        gap = closeness * width
         depth = np.linalg.norm(top - bottom, axis=1).max()
         rows = int(depth / gap)
         for i in range(rows):
@@ -344,7 +348,8 @@ class _Sitter:
 
         dark = np.float32([0.2, 0, 0])
         if radius > 1.6 * width:
-            spiral(0.95, 0.35, 0.7, 0.75, colour)
+            spiral(0.95, 0.35, 0.7, 0.5, np.float32([colour[0], 0, 0.02]))  # greyed, as irises are
+            spiral(0.95, 0.35, 0.7, 0.55, colour)
             spiral(1.0, 0.95, 1.0, 0.65, colour * np.float32([0.6, 1, 1]))
             spiral(0.45, 0, 0.5, 1.0, dark)
         else:
@@ -359,12 +364,12 @@ class _Sitter:
             free = np.linalg.norm(path - eye.centre, axis=1) > eye.radius
             return np.float32(shade * (sampled(eye.inside, path) > 0.5) * free)
 
-        self.loft(eye.top, eye.bottom, "white", 0.8 * self.fine, pressed, np.float32([0.6, 0, 0.02]))
+        self.loft(eye.top, eye.bottom, "white", 0.8 * self.fine, pressed, np.float32([0.6, 0, 0.02]), 0.5)
 
     def shown_white(self, light: float) -> float:
-        """How much grey a white of this OKLab lightness gets: half of what the photo shows."""
+        """How much grey a white of this OKLab lightness gets: a part of what the photo shows."""
         light = max(light, float(self.skin[0]))
-        return float(np.clip(0.5 * (0.95 - light) / 0.4, 0, 0.6))
+        return float(np.clip(0.4 * (0.95 - light) / 0.4, 0, 0.6))
 
     def brow(self, side: int) -> None:
         """Short hairs that lean outwards, where the photo has them."""
@@ -419,7 +424,7 @@ class _Sitter:
 
         def pressed(path: Floats) -> Floats:
             off = np.linalg.norm(sampled(self.near, path) - self.skin, axis=1)
-            return np.float32(np.clip(0.22 + 2 * off, 0, 0.85))
+            return np.float32(np.clip(0.12 + 2.4 * off, 0, 0.85))
 
         for top, bottom in bands:
             self.loft(top, bottom, "lips", width, pressed, colour)
@@ -435,16 +440,16 @@ class _Sitter:
             return
         inside = subject.polygons([np.concatenate([top, bottom[::-1]])], self.light.shape) > 0.5
         teeth = float(np.quantile(self.light[inside], 0.85)) if inside.any() else 1.0
-        shown = self.shown_white(teeth)
+        shown = 0.5 * self.shown_white(teeth)
 
         def cavity(path: Floats) -> Floats:
             return np.float32(np.clip((self.skin[0] - 0.25 - sampled(self.light_near, path)) / 0.15, 0, 1))
 
         def shade(path: Floats) -> Floats:
             light = sampled(self.light_near, path)
-            return np.float32(np.clip(shown + 0.8 * (teeth - light - 0.05), 0, 0.6) * (cavity(path) < 0.2))
+            return np.float32(np.clip(shown + 1.2 * (teeth - light - 0.03), 0, 0.6) * (cavity(path) < 0.2))
 
-        self.loft(top, bottom, "white", 0.9 * self.fine, shade, np.float32([0.7, 0, 0.03]))
+        self.loft(top, bottom, "white", 0.9 * self.fine, shade, np.float32([0.72, 0.01, 0.05]), 0.5)
         self.loft(top, bottom, "mouth", 0.9 * self.fine, cavity, np.float32([0.28, 0.08, 0.04]))
 
     def contours(self) -> None:
@@ -474,9 +479,11 @@ class _Sitter:
 
     def blots(self) -> None:
         """Eyes and mouth of a face too small for features."""
+        dark = np.float32([max(0.2, self.skin[0] - 0.35), *(0.6 * self.skin[1:])])
         for side in (0, 1):
             top, bottom = (self.face.path(lid[side]) for lid in (subject.UPPER_LID, subject.LOWER_LID))
-            self.line(0.5 * (top + bottom), "lid", 0.15, 0.5, 2, 1.0, (0.1, 0.1))
+            if np.linalg.norm(top[0] - top[-1]) > 0.35 * self.eye:
+                self.line(0.5 * (top + bottom), "lid", 0.3, 0.8, 2, 1.0, (0.1, 0.1), colour=dark)
         lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
         self.line(lips, "mouth", 0.15, 0.3, 2, 1.0, (0.1, 0.1), 1.3)
 
@@ -694,7 +701,7 @@ def strokes(
 
 def _crayon(mark: Mark, table: Floats) -> tuple[int, float]:
     """The crayon (of a table (k, p, 3) of colours) for a mark, and how much of its strength is wanted."""
-    off = (((table - mark.colour) * np.float32([1.2, 1, 1])) ** 2).sum(-1)
+    off = (((table - mark.colour) * WEIGHTS.get(mark.role, WEIGHTS[""])) ** 2).sum(-1)
     if mark.role not in AREAS:
         off[:, :-1] = np.inf
     if mark.role not in AREAS + FREE:
