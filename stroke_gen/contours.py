@@ -74,7 +74,8 @@ def outlines(plan: Plan, now: Floats, inside: Floats, style: Style, rng: np.rand
         some = lines.only(mine)
         level = np.clip(0.5 + some.contrast / 0.3, 0.5, 1.2) * np.repeat(pressure[mine], np.diff(some.first))
         paths = hand.Paths(some.points, level.astype(np.float32), np.zeros(len(level), np.int32), some.first)
-        strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng, TAPER)
+        for _ in range(style.search):
+            strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng, TAPER)
     return strokes
 
 

@@ -39,7 +39,9 @@ def generate(
     with ThreadPoolExecutor(threads) as pool:
         seen = scene.read(photo, subject, width_mm, height_mm, swatches, style, focus, pool)
         plan = _plan(seen, swatches, style, rng, pool)
-        inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, style.tip_mm / seen.cell_mm, rng)
+        tip = style.tip_mm / seen.cell_mm
+        inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, tip, rng)
+        inside *= margin.faded(seen.care, style.fade, tip, style.wrist_deg, rng)
         for stage in _stages(plan, swatches, inside, style, rng):
             fresh = hand.within(stage(look(seen.label.shape)), width_mm, height_mm)
             draw(fresh)

@@ -53,6 +53,7 @@ class Style:
     crayons: Annotated[int, 1, 64] = 10  # most crayons taken out of the box
     merge: Annotated[float, 0.01, 1] = 0.06  # OKLab units by which two large surfaces must differ to be two
     open: Annotated[float, 0, 4] = 0.5  # how much wider the hatching of the ground is than the subject's
+    fade: Annotated[float, 0, 1] = 0.0  # share of the sheet that is left out, the farthest from the subject
     margin_mm: Annotated[float, 0, 50] = 2.0  # paper left along the sheet's border
     chroma: Annotated[float, 0, 3] = 1.0  # colourfulness asked for
     lift: Annotated[float, 0, 0.25] = 0.0  # middle tones drawn lighter than they are, as paper is lighter than a photo
@@ -67,6 +68,7 @@ class Style:
     flat: Annotated[float, 0, 1] = 0.0  # one pressure for all of a colour instead of following its tone
     fan_deg: Annotated[float, 0, 90] = 0.0  # spread of directions from one colour's areas to another's
     lines: Annotated[float, 0, 5] = 1.0  # amount of outline
+    search: Annotated[int, 1, 4] = 1  # how many times a line is drawn until it sits
     closed: bool = False  # outlines go round whole areas instead of along edges
     lines_first: bool = False  # outlines before the fill, as children draw; drawn once more at the end
     symbols: Annotated[int, 0, 10] = 0  # age of the child who sets faces down as symbols; 0: as they look
@@ -159,7 +161,8 @@ def with_age(style: Style, age: int) -> Style:
         passes=passes,
         tip_mm=style.tip_mm * (0.75 + 0.6 * young),
         crayons=round(9 - 4 * young),
-        merge=0.08 + 0.06 * young,
+        merge=0.12 + 0.05 * young,
+        symbols=age,
         overshoot=0.2 + 0.6 * young,
         wobble=0.06 + 0.2 * young,
         force_spread=0.15 + 0.25 * young,
