@@ -8,6 +8,7 @@ from .analysis import wide_blur
 
 Floats = NDArray[np.float32]
 NEAR = 0.12  # long sides over which what lies near the subject is drawn with it
+DRAWN = 0.6  # care from which nothing is left out
 FRAYED = 0.3  # how far the fading goes to and fro, in powers of e of the nearness
 RAGGED = 0.45  # tips to and fro
 
@@ -33,7 +34,7 @@ def faded(care: Floats, fade: float, tip: float, wrist_deg: float, rng: np.rando
         return np.ones_like(care)
     near = care + wide_blur(care, NEAR * max(care.shape)) + wide_blur(care, 3 * NEAR * max(care.shape))
     near = np.log(near + 1e-3) + FRAYED * _streaks(care.shape, tip, wrist_deg, rng)
-    return (near > np.quantile(near[::2, ::2], fade)).astype(np.float32)
+    return ((near > np.quantile(near[::2, ::2], fade)) | (care > DRAWN)).astype(np.float32)
 
 
 def _streaks(shape: tuple[int, ...], cells: float, wrist_deg: float, rng: np.random.Generator) -> Floats:

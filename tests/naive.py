@@ -84,8 +84,11 @@ def balance(gaps: list[float], wanted: float) -> float:
     return (low + high) / 2
 
 
-def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1):
-    """Fig. 7 for all cells in contact at once; changes `over`, returns what the crayon's own wax adds where."""
+def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1, yields=0.0):
+    """Fig. 7 for all cells in contact at once; changes `over`, returns what the crayon's own wax adds where.
+
+    Of the share nu that could move pull / (pull + yields) does, pull being the sum of Eq. 4.
+    """
     own, others, blends = {}, {}, []
     for (y, x), overlap in over.items():
         standing = min(columns[y, x].wax(), overlap)
@@ -101,8 +104,10 @@ def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1)
                 weight[to] = max(0.0, pull)
         if not sum(weight.values()):
             continue
-        over[y, x] -= nu * standing
-        lifted, from_blend = take(columns[y, x], nu * standing)
+        pull = sum(weight.values())
+        moved = nu * standing * pull / (pull + yields)
+        over[y, x] -= moved
+        lifted, from_blend = take(columns[y, x], moved)
         for to, w in weight.items():
             share = w / sum(weight.values())
             for crayon, height in lifted:
@@ -162,10 +167,22 @@ def under_tip(columns, mask, top, left, firm=1.0):
     }
 
 
-def throw(number: int) -> int:
-    """0, 1 or 2, as if thrown."""
+def luck(number: int) -> float:
+    """0 to 1, as if thrown."""
     word = number * 2654435761 % 2**32
-    return (word ^ word >> 15) * 2654435761 % 2**32 // 2**16 % 3
+    return (word ^ word >> 15) * 2654435761 % 2**32 // 2**16 / 2**16
+
+
+def hop(number: int, mean: float, scatter: float) -> int:
+    """How many cells wax is pushed at contact `number`."""
+    return max(1, math.floor(mean + 0.5 + scatter * (2 * luck(number) - 1)))
+
+
+def grip(begun, along: float) -> float:
+    """How much more than usual the crayon sticks to the paper: straight lines between a throw at each length."""
+    x, y = (math.floor(4 * v) for v in begun)
+    stroke, step = 7919 * x + 104729 * y, math.floor(along)
+    return 2 * np.interp(along - step, [0, 1], [luck(stroke + step), luck(stroke + step + 1)]) - 1
 
 
 def contacts(points, stride):
@@ -180,7 +197,7 @@ def contacts(points, stride):
 
 def rub(columns, points, mask, wax, step, smears, constants, per_lambda, optics, reach=1):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
-    mu_paper, mu_wax, film, rate, push, relief, nu, alpha, beta, _, wear, _, heap, firm = (float(c) for c in constants)
+    c = constants
     points, mask = points.astype(float), mask.astype(float)
     side = mask.shape[0]
     stride = max(1.0, step * (side - 2 * reach))
@@ -195,20 +212,23 @@ def rub(columns, points, mask, wax, step, smears, constants, per_lambda, optics,
         dither_x, dither_y = (0.5 + contact * 0.7548776662) % 1, (0.5 + contact * 0.5698402910) % 1
         contact += 1
         left, top = math.floor(x - 0.5 + dither_x) - side // 2, math.floor(y - 0.5 + dither_y) - side // 2
-        gaps = under_tip(columns, mask, top, left, firm)
+        gaps = under_tip(columns, mask, top, left, float(c.firm))
         if not gaps:
             continue
-        wanted = force * per_lambda * len(gaps) / int((mask < 1e8).sum())
-        h = balance(list(gaps.values()), wanted)
+        held = 1 + float(c.slip) * grip(np.float32(touches[0][0][:2]) / c.slip_cells, n * stride / float(c.slip_cells))
+        wanted = force * per_lambda * held * len(gaps) / int((mask < 1e8).sum())
+        h = balance(list(gaps.values()), min(wanted, float(c.most) * len(gaps)))
         over = {cell: gap - h for cell, gap in gaps.items() if gap > h}
-        tops = {cell: column.top(firm) for cell, column in columns.items()}
+        tops = {cell: column.top(float(c.firm)) for cell, column in columns.items()}
         own = {}
         if smears:
-            own = smear(columns, over, tops, direction, wax, 1 - (1 - nu) ** stride, alpha, beta, optics,
-                        max(1, reach - throw(n)))  # fmt: skip
+            nu = 1 - (1 - float(c.nu)) ** stride
+            cells = hop(n, float(c.hop), float(c.scatter))
+            own = smear(columns, over, tops, direction, wax, nu, c.alpha, c.beta, optics, cells, float(c.yields))
         worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
-        given += deposit(columns, over, tops, direction, own, worn, push if push > 0 else force,
-                         rate * stride, film, mu_paper, mu_wax, relief, wear, heap)  # fmt: skip
+        push, rate = float(c.push) if c.push > 0 else force, float(c.rate) * stride
+        given += deposit(columns, over, tops, direction, own, worn, push, rate, float(c.film), c.mu_paper,
+                         c.mu_wax, float(c.relief), float(c.wear), float(c.heap))  # fmt: skip
         for cell, height in worn.items():
             mask[cell[0] - top, cell[1] - left] = height
         for cell, height in own.items():
@@ -233,13 +253,14 @@ def over(ground: float, kh: float, sh: float) -> float:
     return r + t * t * ground / (1 - r * ground)
 
 
-def colour(column: Column, ground, optics: np.ndarray) -> np.ndarray:
-    """Light that comes back from a column: its layers over each other, bottom up."""
+def colour(column: Column, ground, optics: np.ndarray, surface: float = 0.0, film_um: float = 1.0) -> np.ndarray:
+    """Light that comes back from a column: its layers over each other, bottom up, and what its surface reflects."""
     seen = [float(g) for g in ground]
     layers = [column.blend[1:], *(height * optics[crayon].astype(float) for crayon, height in column.layers)]
     for layer in layers:
         seen = [over(seen[c], layer[c], layer[3 + c]) for c in range(3)]
-    return np.array(seen)
+    front = surface * column.wax() / (column.wax() + film_um)
+    return front + (1 - front) * np.array(seen)
 
 
 def levels(points, first, reach, rows, cols, tile) -> list[int]:

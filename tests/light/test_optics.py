@@ -10,6 +10,7 @@ from crayonize.light import optics
 from crayonize.wax import rub
 
 over = optics._over
+FRONT, FILM_UM = 0.0325, 0.5  # what wax of refractive index 1.44 reflects, and the film that does half of it
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def test_a_picture_is_its_columns_bottom_up(table, ground):
     picture = optics.render(sheet, ground, light=False)
     assert picture.dtype == np.float32 and picture.shape == (23, 31, 3)
     for at, column in naive.columns_of(sheet).items():
-        np.testing.assert_allclose(picture[at], naive.colour(column, ground, sheet.optics), atol=2e-5)
+        np.testing.assert_allclose(picture[at], naive.colour(column, ground, sheet.optics, FRONT, FILM_UM), atol=2e-5)
     np.testing.assert_array_equal(picture[sheet.film_um() == 0], np.float32(ground) + 0 * picture[sheet.film_um() == 0])
 
 
@@ -135,7 +136,8 @@ def test_more_wax_takes_a_colour_further_from_the_paper(table):
 # ---- the lamp ---------------------------------------------------------------------------------------------
 
 
-def test_the_lamp_can_be_switched_off(table):
+def test_the_lamp_can_be_switched_off(table, monkeypatch):
+    monkeypatch.setattr(optics, "FRONT", 0.0)
     rng = np.random.default_rng(5)
     rough = old_wax(table.sheet(40 * rng.random((40, 40))), rng)
     flat = table.sheet(np.zeros((40, 40)))
@@ -146,6 +148,43 @@ def test_the_lamp_can_be_switched_off(table):
     on = optics.render(rough, (0.7, 0.7, 0.7))
     assert 0.005 < np.abs(on - off).mean() < 0.2 and on.min() >= 0 and on.max() <= 1
     np.testing.assert_allclose(on / on[..., :1], off / off[..., :1], rtol=1e-4)  # the hue stays
+
+
+@pytest.mark.parametrize("um_a_cell", [0.2, 1.0, 5.0])
+def test_a_slope_of_wax_is_lit_by_its_rise_and_bounded(table, um_a_cell, monkeypatch):
+    """.7 % brighter for each 1/100 that wax rises away from the lamp, and never more than a twelfth."""
+    monkeypatch.setattr(optics, "FRONT", 0.0)
+    y, x = np.mgrid[:9, :9]
+    sheet = table.sheet(np.zeros((9, 9)))
+    sheet.total[:] = um_a_cell * (x + y).ravel()
+    lit = optics.render(sheet, (0.5, 0.5, 0.5))[4, 4, 0] / 0.5 - 1
+    rise = 0.007 * 2 * um_a_cell  # along both axes; a cell of .1 mm, so 1 um is 1/100
+    assert lit == pytest.approx(rise / (1 + 12 * rise), rel=1e-3)
+
+
+def test_the_front_surface_reflects_what_does_not_enter(table):
+    """Fresnel's 3.25 % at n = 1.44: the darkest wax is L* 21, white stays white, a bare sheet is as it was."""
+    black, bare = films(table, [[("black", 200.0)], []])
+    inside = 1 + 0.3 / 0.004 - np.sqrt((0.3 / 0.004) ** 2 + 2 * 0.3 / 0.004)
+    assert black[0] == pytest.approx(0.0325 + 0.9675 * inside, rel=0.02)
+    assert (bare == 1).all()
+    sheet = table.sheet(np.zeros((1, 2)))
+    sheet.total[:] = sheet.blend[:, 0] = [1.0, 30.0]
+    sheet.blend[:, 4:] = 5.0  # wax that takes no light: a furnace
+    np.testing.assert_allclose(optics.render(sheet, (1.0, 1.0, 1.0), light=False), 1, atol=1e-5)
+
+
+def test_relief_shows_on_black_wax_by_its_gloss(table):
+    """What the surface reflects follows the relief more than what comes from within."""
+    waves = 10 * np.sin(np.arange(40) / 3)[:, None] + np.zeros(40)
+    contrast = []
+    for crayon in ("black", "white"):
+        sheet = table.sheet(waves)
+        sheet.total[:] = sheet.layer[:, 0] = 60.0
+        sheet.count[:], sheet.crayon[:, 0] = 1, [c.name for c in table.palette.crayons].index(crayon)
+        lit = optics.render(sheet, (0.9, 0.9, 0.9))
+        contrast.append(lit.std() / lit.mean())
+    assert contrast[0] > 2 * contrast[1] > 0
 
 
 def test_a_flat_sheet_is_evenly_lit_and_a_slope_is_lit_from_the_upper_left(table):

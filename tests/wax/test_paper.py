@@ -6,7 +6,7 @@ import pytest
 
 from crayonize.wax import paper
 
-KINDS = ("felt", "lunar", "stipple")
+KINDS = ("pressed", "felt", "lunar", "stipple")
 NAMES = sorted(paper.papers())
 
 
@@ -39,10 +39,16 @@ def test_a_paper_has_the_same_tooth_at_both_resolutions(name, cells_mm):
         field = paper.tooth(described, n, n, cell_mm, 3)
         assert field.dtype == np.float32 and field.shape == (n, n)
         assert field.min() >= 0 and field.max() <= described.depth_um
+        if described.texture == "pressed":  # its fine waves are for fine cells alone
+            blur = 0.3 / cell_mm
+            field = cv2.GaussianBlur(field, (0, 0), blur)
         depths.append(np.ptp(np.percentile(field, (0.5, 99.5))))
         lengths.append(np.mean([correlation_mm(field, cell_mm, way) for way in ((0, 1), (1, 0), (1, 1), (1, -1))]))
         assert ((field == field.min()) | (field == field.max())).mean() < 0.015 or described.texture == "stipple"
-    assert depths == pytest.approx([described.depth_um] * 2, rel=0.05)
+    if described.texture == "pressed":
+        assert depths[1] == pytest.approx(depths[0], rel=0.05)
+    else:
+        assert depths == pytest.approx([described.depth_um] * 2, rel=0.05)
     assert lengths[1] == pytest.approx(lengths[0], rel=0.12)
 
 
@@ -50,13 +56,16 @@ def test_a_paper_has_the_same_tooth_at_both_resolutions(name, cells_mm):
 def test_grain_grows_with_the_wavelength(kind):
     short, long = (np.mean([correlation_mm(heights(kind, wavelength_mm=w, seed=s), 0.1, (0, 1)) for s in range(3)])
                    for w in (0.5, 1.0))  # fmt: skip
-    assert long == pytest.approx(2 * short, rel=0.2)
+    if kind == "pressed":  # of which the waves finer than the grain stay
+        assert 1.3 * short < long < 2 * short
+    else:
+        assert long == pytest.approx(2 * short, rel=0.2)
 
 
-@pytest.mark.parametrize("kind", ["felt", "lunar"])
-def test_felt_and_lunar_are_alike_in_all_directions(kind):
+@pytest.mark.parametrize("kind", ["pressed", "felt", "lunar"])
+def test_papers_are_alike_in_all_directions(kind):
     lengths = [
-        np.mean([correlation_mm(heights(kind, seed=seed), 0.1, way) for seed in range(6)])
+        np.mean([correlation_mm(heights(kind, 640, 0.05, seed), 0.05, way) for seed in range(6)])
         for way in ((0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2))
     ]
     assert np.ptp(lengths) < 0.15 * np.mean(lengths)
@@ -113,6 +122,29 @@ def test_pits_make_a_plateau_with_pits():
     assert pitted.mean() > even.mean() + 8
     assert np.percentile(pitted, 50) - np.percentile(pitted, 1) > 1.5 * np.ptp(np.percentile(pitted, (50, 99)))
     assert (np.diff(pitted.ravel()[np.argsort(even, axis=None)]) >= -1e-3).all()  # the same order of heights
+
+
+def test_a_pressed_paper_is_even_with_pits_down_to_the_finest_cells():
+    field = heights("pressed", 1024, 0.05, wavelength_mm=0.8)
+    low, middle, high = np.percentile(field, (0.5, 50, 99.5))
+    assert (low, high) == (pytest.approx(0, abs=4), pytest.approx(50, abs=2))
+    assert middle - low > 6 * (high - middle)
+    flat = field > middle - 2 * (high - middle)
+    assert 0.7 < flat.mean() < 0.9
+    number, pits = cv2.connectedComponents((field < 0.6 * middle).astype(np.uint8))
+    sizes = np.bincount(pits.ravel())[1:]
+    assert number > 200 and np.percentile(sizes, 95) > 8 * np.median(sizes)  # of all sizes
+
+
+def test_fine_waves_of_a_pressed_paper_are_not_folded_into_coarse_ones():
+    """A wave shorter than two cells is left out; felt and scans keep as much height whatever the cells."""
+    power = []
+    for cell_mm in (0.3, 0.05):
+        fields = [heights("pressed", round(24 / cell_mm), cell_mm, seed) for seed in range(3)]
+        spectra = [np.abs(np.fft.rfft2(f - f.mean())) ** 2 / f.size**2 for f in fields]
+        wave = np.hypot(np.fft.fftfreq(len(fields[0]), cell_mm)[:, None], np.fft.rfftfreq(len(fields[0]), cell_mm))
+        power.append([np.sum(spectra, 0)[(wave > a) & (wave < b)].sum() for a, b in ((0.3, 0.8), (0.8, 1.4))])
+    assert power[0] == pytest.approx(power[1], rel=0.2)
 
 
 @pytest.mark.parametrize("rows, cols", [(1, 1), (1, 50), (7, 3), (31, 77)])
@@ -185,7 +217,7 @@ def test_shipped_papers_are_sound(name):
         ({"colour": 5}, "paper.colour: 5 is not a text"),
         ({"colour": "red"}, "colour: 'red' is not #rrggbb"),
         ({"texture": None}, "paper.texture: None is not a text"),
-        ({"texture": "nowhere.png"}, "paper.texture: 'nowhere.png' is neither one of lunar, stipple, felt nor"),
+        ({"texture": "nowhere.png"}, "paper.texture: 'nowhere.png' is neither one of pressed, lunar"),
         ({"name": "velvet"}, "paper: 'velvet' is neither"),
         (7, "paper: 7 is neither a name nor a table"),
         (None, "paper: None is neither a name nor a table"),

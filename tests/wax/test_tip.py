@@ -93,7 +93,7 @@ def test_bumps_have_their_height_and_wavelength_in_mm(monkeypatch):
     monkeypatch.setattr(tip, "DROPS_UM", dict.fromkeys(KINDS, 0.0))
     spread, slope = [], []
     for cell_mm in (0.1, 0.05):
-        masks = [made("blunt", 6.0, cell_mm, seed=seed) for seed in range(4)]
+        masks = [made("blunt", 16.0, cell_mm, seed=seed) for seed in range(4)]
         n = masks[0].shape[0]
         inner = [m[n // 4 : -n // 4, n // 4 : -n // 4] for m in masks]
         spread.append(np.mean([m.std() for m in inner]))

@@ -64,12 +64,13 @@ class Window:
         """Wax of the crayon in hand gathered for each cell."""
         return {self.cell(at): float(self.inflow[at]) for at in np.flatnonzero(self.inflow)}
 
-    def smear(self, direction, crayon, nu, alpha=0.2, beta=0.8):
+    def smear(self, direction, crayon, nu, yields, alpha=0.2, beta=0.8):
         """Smear, and lay all wax but that of the crayon in hand; returns how many other crayons moved."""
         columns, v = self.sheet.columns(), np.float32(direction)
         contact._open(self.w, self.size, 0, crayon, 0)
         contact._weigh(self.w, self.side, self.reach, v[0], v[1], np.float32(alpha), np.float32(beta))
-        slots = contact._smear(self.w, self.side, self.reach, self.home, np.float32(nu), columns)
+        slots = contact._smear(self.w, self.side, self.reach, self.home, np.float32(nu), np.float32(yields),
+                               columns)  # fmt: skip
         own = self.inflow.copy()
         self.inflow[:] = 0
         contact._settle(self.w, slots, self.home, np.float32(wax.THIN_UM), columns)
@@ -143,8 +144,10 @@ def test_look_sees_the_surface_and_nothing_off_the_sheet(bench):
         np.testing.assert_allclose([seen[at] for at in twin], list(twin.values()), atol=1e-4)
 
 
-@pytest.mark.parametrize("nu, reach", [(0.1, 1), (0.6, 1), (0.95, 1), (0.6, 2), (0.6, 3)])
-def test_smear_is_fig_7(bench, nu, reach):
+@pytest.mark.parametrize(
+    "nu, reach, yields", [(0.1, 1, 0.0), (0.6, 1, 5.0), (0.95, 1, 0.0), (0.6, 2, 0.0), (0.6, 3, 20.0)]
+)
+def test_smear_is_fig_7(bench, nu, reach, yields):
     rng = np.random.default_rng(4)
     sheet = old_wax(bench.sheet(40 * rng.random((19, 23))), rng)
     from_blend, others = 0.0, 0
@@ -154,8 +157,8 @@ def test_smear_is_fig_7(bench, nu, reach):
         tops = {at: column.top() for at, column in columns.items()}
         before = sum(c.blend[0] for c in columns.values())
         direction = towards(40 * turn)
-        others += window.smear(direction, turn % 3, nu)
-        own = naive.smear(columns, over, tops, direction, turn % 3, nu, 0.2, 0.8, sheet.optics, reach)
+        others += window.smear(direction, turn % 3, nu, yields)
+        own = naive.smear(columns, over, tops, direction, turn % 3, nu, 0.2, 0.8, sheet.optics, reach, yields)
         assert_same(sheet, columns)
         assert over.keys() == window.overlaps().keys()
         np.testing.assert_allclose(list(window.overlaps().values()), list(over.values()), atol=1e-3)
@@ -207,6 +210,8 @@ def test_a_stroke_is_fig_3(bench, path, reach):
     per_lambda = np.float32(1 / (bench.physics.lam * sheet.cell_mm**2))
     points = np.stack([x, y, um * (mask < ABSENT).sum() / per_lambda], 1)
     constants = bench.changed(epsilon_um=1e-4).physics.constants(sheet.cell_mm)  # the twin's force is exact
+    mean, scatter = {1: (1.0, 0.0), 2: (1.5, 0.5)}[reach]
+    constants = constants._replace(hop=np.float32(mean), scatter=np.float32(scatter))
     loss, one, crayon = np.zeros(1), np.zeros(1, np.int64), 2
     first = np.array([0, len(points)])
     queue = schedule.queue(schedule.order(points, first, np.ones(1, np.float32), sheet.rows, sheet.cols))
@@ -433,19 +438,68 @@ def test_the_film_does_not_depend_on_the_resolution(bench, um):
 
 
 def test_wax_is_smeared_equally_far_at_any_resolution(bench):
-    spread = []
-    for cell_mm in (0.15, 0.1, 0.05):
-        n = round(10 / cell_mm)
-        sheet, x = bench.felt(n, n, cell_mm), (np.arange(n) + 0.5) * cell_mm
-        band = np.tile(np.abs(x - 5) < 0.8, n)  # of old wax, which the crayon crosses without leaving any
-        sheet.total[band], sheet.count[band], sheet.layer[band, 0], sheet.crayon[band, 0] = 20, 1, 20, 2
-        before = x[(np.abs(x - 5) < 0.8)].var()
-        across = [bench.stroke([[1, y], [9, y]], 8.0) for y in np.arange(1, 9.1, 0.6)]
-        bench.changed(rate_per_mm=0.0).draw(sheet, across)
-        film = sheet.film_um()[round(2 / cell_mm) : round(8 / cell_mm)].mean(0)
-        mean = (film * x).sum() / film.sum()
-        spread.append(np.sqrt((film * (x - mean) ** 2).sum() / film.sum() - before))
-    assert np.ptp(spread) < 0.25 * np.mean(spread)
+    """How far old wax goes on the whole, and how much of it leaves a band that a crayon without wax crosses."""
+    drift, beyond = [], []
+    for cell_mm in (0.3, 0.15, 0.1, 0.05):
+        n, runs = round(9 / cell_mm), []
+        x = (np.arange(n) + 0.5) * cell_mm
+        on = np.abs(x - 4.5) < 0.8
+        for seed in range(4):
+            sheet, band = bench.felt(n, n, cell_mm, seed), np.tile(on, n)
+            sheet.total[band], sheet.count[band], sheet.layer[band, 0], sheet.crayon[band, 0] = 20, 1, 20, 2
+            across = [bench.stroke([[1, y], [8, y]], 8.0) for y in np.arange(1, 8.1, 0.6)]
+            bench.changed(rate_per_mm=0.0).draw(sheet, across)
+            film = sheet.film_um()[round(2 / cell_mm) : round(7 / cell_mm)].mean(0)
+            mean = (film * x).sum() / film.sum()
+            runs.append((mean - x[on].mean(), film[x > x[on].max() + cell_mm / 2].sum() * cell_mm))
+        drift.append(np.mean(runs, 0)[0])
+        beyond.append(np.mean(runs, 0)[1])
+    if bench.physics.push:
+        assert np.ptp(drift) < 0.25 * np.mean(drift) and np.ptp(beyond) < 0.6 * np.mean(beyond)
+    else:  # as printed, Fig. 7 moves a share that knows no pull, and overshoots on coarse cells
+        assert np.ptp(drift[1:]) < 0.25 * np.mean(drift)
+
+
+@pytest.mark.parametrize("cell_mm", [297 / 1600, 0.0667])
+@pytest.mark.parametrize("um", [10.0, 25.0])
+def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
+    """On flat paper under a smooth tip wax comes to lie level: no grain of single cells, as a fixed share leaves."""
+    if not bench.physics.push:
+        pytest.skip("Fig. 7 as printed moves wax past the level that it seeks")
+    monkeypatch.setattr("crayonize.wax.tip.BUMP_UM", 0.0)
+    n = round(14 / cell_mm)
+    sheet = bench.sheet(np.zeros((n, n)), cell_mm)
+    bench.draw(sheet, hatching(bench, um, 14.0, 30))
+    film = sheet.film_um()[n // 4 : -n // 4, n // 4 : -n // 4].astype(float)
+    fine = film - (np.roll(film, 1, 0) + np.roll(film, -1, 0) + np.roll(film, 1, 1) + np.roll(film, -1, 1)) / 4
+    fine = fine[2:-2, 2:-2]
+    assert fine.std() < 0.06 * film.mean()
+    assert (fine[1:] * fine[:-1]).mean() > -0.2 * fine.var()  # every other cell high: -.26 to -.41 if nothing yields
+
+
+def test_nothing_is_pressed_harder_than_wax_bears(bench):
+    """A tenfold force beyond what the wax bears leaves the same film, to the byte."""
+    if not np.isfinite(bench.physics.bears):
+        pytest.skip("the paper knows no such bound")
+    films = []
+    for times in (1.3, 13.0):
+        sheet = bench.felt(60, 120)
+        bench.draw(sheet, [bench.stroke([[1, 3], [11, 3]], times * bench.physics.bears / bench.physics.lam)])
+        films.append(sheet.total.copy())
+    np.testing.assert_array_equal(*films)
+
+
+def test_a_crayon_slips_along_its_stroke(bench):
+    """Film along a stroke on flat paper comes and goes over about a millimetre, and not where slip is 0."""
+    if not bench.physics.slip:
+        pytest.skip("the paper's crayon follows the hand")
+    waves = []
+    for slip in (0.0, bench.physics.slip):
+        sheet = bench.sheet(np.zeros((30, 400)))
+        bench.changed(slip=slip, wear=0.0).draw(sheet, [bench.stroke([[1, 1.5], [39, 1.5]], 6.0)], smears=False)
+        along = sheet.film_um()[10:20, 30:370].mean(0)
+        waves.append(along.std() / along.mean())
+    assert waves[0] < 0.05 and 0.05 < waves[1] < 0.3
 
 
 def test_a_long_stroke_has_no_rhythm(bench):

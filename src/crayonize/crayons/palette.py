@@ -26,9 +26,12 @@ MAX_CRAYONS = 254
 MAX_FILE_BYTES = 1_000_000
 
 _DATA = Path(__file__).parents[1] / "data" / "palettes"
-_DEFAULT_FILM_UM = 20.0
+_DEFAULT_FILM_UM = 15.0
 _HEX = re.compile(r"#[0-9a-fA-F]{6}")
 _MAX_NAME = 60
+
+FRONT = ((1.44 - 1) / (1.44 + 1)) ** 2  # of the light that meets wax its surface reflects (Fresnel; n of paraffin 1.44)
+_CLEAN = 0.5  # how much better than its hiding a crayon hides in a channel of reflectance 1/2
 
 # A crayon is never perfectly black or white in any channel; the inversion needs colours strictly between.
 _DARKEST, _LIGHTEST = 0.005, 0.985
@@ -212,7 +215,7 @@ def _layer_crayon(data: dict[str, Any], film_um: float, layer_um: float, where: 
         )
     tints = [max(_DARKEST, _linear(value)) for value in colour]
     k, sc = _per_um([(s * tint, t * tint) for tint in tints], layer_um)
-    over_white = [_over_white(k[c] * film_um, sc[c] * film_um) for c in range(3)]
+    over_white = [FRONT + (1 - FRONT) * _over_white(k[c] * film_um, sc[c] * film_um) for c in range(3)]
     return Crayon(_crayon_name(data["name"], f"{where}.name"), _hex_of_linear(over_white), k, sc)
 
 
@@ -317,11 +320,15 @@ def _plain(name: str) -> str:
 
 
 def _colour_crayon(name: str, colour: str, hiding: float, film_um: float) -> Crayon:
-    """A crayon from its colour over white, Rw, and black, Rb = hiding Rw: R = Rb, T^2 = (Rw - Rb)(1 - Rb)."""
+    """A crayon from its colour over white, Rw, and black, Rb: R = Rb, T^2 = (Rw - Rb)(1 - Rb).
+
+    What its front surface reflects is taken off the colour. Rb is `hiding` Rw, and more in channels half bright:
+    there thick wax of even hiding would be much darker than its hex, and heavy red brown, which it is not.
+    """
     layers = []
     for value in _linear_of_hex(colour):
-        white = min(_LIGHTEST, max(_DARKEST, value))
-        black = hiding * white
+        white = min(_LIGHTEST, max(_DARKEST, (value - FRONT) / (1 - FRONT)))
+        black = white * (hiding + (1 - hiding) * _CLEAN * (1 - (1 - white) ** 6) * (1 - white**2 / 2))
         layers.append((black, math.sqrt((white - black) * (1 - black))))
     k, s = _per_um(layers, film_um)
     return Crayon(name, colour, k, s)

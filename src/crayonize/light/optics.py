@@ -7,14 +7,16 @@ A quiet light from the upper left shades the relief of paper and wax.
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.jit import kernel
 
+from ..crayons.palette import FRONT
 from ..images.icc import encode_srgb
+from ..wax.contact import BLEND, LAYERS
 from ..wax.sheet import Sheet
 from . import area
 
@@ -22,7 +24,9 @@ Floats = NDArray[np.float32]
 Colour = tuple[float, float, float]
 T = TypeVar("T")
 
-LIGHT = 0.007  # change of brightness per 1/100 of slope, before saturation
+LIGHT = 0.007  # change of brightness per 1/100 of slope, before saturation: 3 to 6 % over a drawing
+FILM_UM = 0.5  # a film so thin has half of its front surface: the rest is in gaps
+GLOSS = 6.0  # how much more the relief shows in what the surface reflects than in what comes through it
 BAND = 1 << 17  # cells rendered by one task
 
 
@@ -42,43 +46,62 @@ def _over(ground, kh, sh):  # type: ignore[no-untyped-def]
     return (a * left + b * b * ground) / (d * left)
 
 
+class Lamp(NamedTuple):
+    """How light falls on a sheet; all float32."""
+
+    slope: np.float32  # change of brightness per um that one cell stands higher than the next
+    front: np.float32  # share of the light that the surface of wax reflects
+    film: np.float32  # um
+    gloss: np.float32
+
+
 @kernel
-def _render(  # type: ignore[no-untyped-def]
-    top, bottom, left, right, ground, light, paper, total, count, crayon, layer, blend, optics, cols, first, out
-):
-    """Rows top..bottom, columns left..right of a sheet `cols` wide into out (n, cols, 3), which begins at `first`."""
-    rows = count.size // cols
+def _render(top, bottom, left, right, ground, lamp, columns, cols, first, out):  # type: ignore[no-untyped-def]
+    """Rows top..bottom, columns left..right of a sheet `cols` wide into out (n, cols, 3).
+
+    `out` begins at row `first` of the sheet.
+    """
+    one = np.float32(1)
+    paper, total, blend, optics = columns.paper, columns.total, columns.blend, columns.optics
+    rows = columns.used.size // cols
     for y in range(top, bottom):
         row = y - first
         for x in range(left, right):
             cell = y * cols + x
             for c in range(3):
                 out[row, x, c] = ground[c]
-            if blend[cell, 0] > 0:
+            # Up through the column, blend first.
+            if blend[cell * BLEND] > 0:
                 for c in range(3):
-                    out[row, x, c] = _over(out[row, x, c], blend[cell, 1 + c], blend[cell, 4 + c])
-            for j in range(count[cell]):
-                h, wax = layer[cell, j], crayon[cell, j]
+                    kh, sh = blend[cell * BLEND + 1 + c], blend[cell * BLEND + 4 + c]
+                    out[row, x, c] = _over(out[row, x, c], kh, sh)
+            for j in range(columns.used[cell]):
+                h = columns.layer[cell * LAYERS + j]
+                wax = np.int64(columns.crayon[cell * LAYERS + j]) * 6
                 for c in range(3):
-                    out[row, x, c] = _over(out[row, x, c], h * optics[wax, c], h * optics[wax, 3 + c])
-            if light > 0:
+                    out[row, x, c] = _over(out[row, x, c], h * optics[wax + c], h * optics[wax + 3 + c])
+            # The relief under a lamp from the upper left.
+            shade = np.float32(0)
+            if lamp.slope > 0:
                 before = cell - (cols if y > 0 else 0) - (1 if x > 0 else 0)
                 after = cell + (cols if y < rows - 1 else 0) + (1 if x < cols - 1 else 0)
-                fall = (paper[before] - paper[after]) * np.float32(0.35) + total[before] - total[after]
-                shade = -fall * light
-                shade = np.float32(1) + shade / (np.float32(1) + abs(shade) * np.float32(12))
-                for c in range(3):
-                    out[row, x, c] = min(np.float32(1), out[row, x, c] * shade)
+                rise = (paper[after] - paper[before]) * np.float32(0.35) + total[after] - total[before]
+                shade = rise * lamp.slope
+                shade /= one + abs(shade) * np.float32(12)
+            # What the front surface reflects never went through the wax.
+            front = lamp.front * total[cell] / (total[cell] + lamp.film)
+            front *= max(one + lamp.gloss * shade, np.float32(0))
+            for c in range(3):
+                inside = out[row, x, c] * (one + shade)
+                out[row, x, c] = min(one, front + (one - front) * inside)
 
 
 @kernel
-def _render_parts(  # type: ignore[no-untyped-def]
-    parts, ground, light, paper, total, count, crayon, layer, blend, optics, cols, first, out
-):
+def _render_parts(parts, ground, lamp, columns, cols, first, out):  # type: ignore[no-untyped-def]
     """Render parts (n, 4), each top, bottom, left, right."""
     for i in range(parts.shape[0]):
-        _render(parts[i, 0], parts[i, 1], parts[i, 2], parts[i, 3], ground, light, paper, total, count, crayon, layer,
-                blend, optics, cols, first, out)  # fmt: skip
+        top, bottom, left, right = parts[i]
+        _render(top, bottom, left, right, ground, lamp, columns, cols, first, out)
 
 
 def render(sheet: Sheet, ground: Colour, *, light: bool = True, threads: int = 1) -> Floats:
@@ -136,6 +159,6 @@ def render_parts(
     sheet: Sheet, ground: Colour, parts: NDArray[np.int64], out: Floats, *, first: int = 0, light: bool = True
 ) -> None:
     """Renew parts (n, 4), each top, bottom, left, right in cells, of a picture `out` that begins at row `first`."""
-    strength = np.float32(LIGHT * 0.1 / sheet.cell_mm * 0.5 if light else 0)
-    _render_parts(parts, np.array(ground, np.float32), strength, sheet.paper, sheet.total, sheet.count, sheet.crayon,
-                  sheet.layer, sheet.blend, sheet.optics, sheet.cols, first, out)  # fmt: skip
+    slope = LIGHT * 0.1 / sheet.cell_mm * 0.5 if light else 0.0
+    lamp = Lamp(*(np.float32(value) for value in (slope, FRONT, FILM_UM, GLOSS)))
+    _render_parts(parts, np.array(ground, np.float32), lamp, sheet.columns(), sheet.cols, first, out)

@@ -20,9 +20,21 @@ from .queue import patient_take
 LAYERS = 4  # pure layers a cell
 BLEND = 7  # height, then k*h and s*h for red, green, blue
 NONE = 255  # no slot
-HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS = range(6)  # what `hand` holds
+HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS, BEGUN = range(7)  # what `hand` holds
 
 Floats = NDArray[np.float32]
+
+
+class Columns(NamedTuple):
+    """The wax on a sheet, cell by cell (see `Sheet`), as flat arrays."""
+
+    paper: Floats
+    total: Floats
+    used: NDArray[np.uint8]  # how many pure layers
+    crayon: NDArray[np.uint8]  # LAYERS a cell
+    layer: Floats  # LAYERS a cell
+    blend: Floats  # BLEND a cell
+    optics: Floats  # 6 a crayon
 
 
 class Window(NamedTuple):
@@ -65,7 +77,7 @@ def window(cells: int, crayons: int) -> Window:
         mask=floats(1), surface=floats(1), film=floats(1), over=floats(1), weights=floats(1), weight=floats(8),
         broken=floats(1), blended=floats(BLEND), taken=floats(slots), arriving=floats(slots),
         slot_of=numbers(np.uint8, 256, NONE), crayon_of=numbers(np.uint8, 256),
-        begin=numbers(np.int64, 256), end=numbers(np.int64, 256), hand=numbers(np.float64, 6),
+        begin=numbers(np.int64, 256), end=numbers(np.int64, 256), hand=numbers(np.float64, 7),
     )  # fmt: skip
 
 
@@ -154,9 +166,9 @@ def _wear(broken, wear, inflow, mask):  # type: ignore[no-untyped-def]
 @inner_kernel
 def _add(cell, wax, height, thin, columns):  # type: ignore[no-untyped-def]
     """Lay `height` of pure crayon `wax` on a column; films thinner than `thin` do not part two layers."""
-    _, total, count, crayon, layer, blend, optics = columns
-    total[cell] += height
-    base, n = _whole(cell * LAYERS), _whole(count[cell])
+    used, crayon, layer = columns.used, columns.crayon, columns.layer
+    columns.total[cell] += height
+    base, n = _whole(cell * LAYERS), _whole(used[cell])
     found = LAYERS
     for j in range(LAYERS):  # upwards and without branches, for which way they go could not be foretold
         parted = LAYERS if layer[base + j] >= thin else found
@@ -166,16 +178,16 @@ def _add(cell, wax, height, thin, columns):  # type: ignore[no-untyped-def]
         return
     if n == LAYERS:  # the lowest layer is hidden: it sinks into the blend
         h, low, sunk = layer[base], _whole(crayon[base] * 6), _whole(cell * BLEND)
-        blend[sunk] += h
+        columns.blend[sunk] += h
         for c in range(6):
-            blend[sunk + 1 + c] += h * optics[low + c]
+            columns.blend[sunk + 1 + c] += h * columns.optics[low + c]
         for j in range(LAYERS - 1):
             crayon[base + j] = crayon[base + j + 1]
             layer[base + j] = layer[base + j + 1]
         n -= 1
     crayon[base + n] = wax
     layer[base + n] = height
-    count[cell] = n + 1
+    used[cell] = n + 1
 
 
 @lean_kernel
@@ -202,8 +214,8 @@ def _settle(w, slots, home, thin, columns):  # type: ignore[no-untyped-def]
 @inner_kernel
 def _take(w, cells, slots, at, cell, left, scale, columns):  # type: ignore[no-untyped-def]
     """Lift `left` um off the top of a column, as far as its pure layers go; returns what is missing, and slots."""
-    _, _, count, crayon, layer, _, _ = columns
-    base, n, kept = _whole(cell * LAYERS), np.int64(count[cell]), 0
+    crayon, layer = columns.crayon, columns.layer
+    base, n, kept = _whole(cell * LAYERS), np.int64(columns.used[cell]), 0
     for down in range(LAYERS):
         j = LAYERS - 1 - down
         there = layer[base + j] if j < n else np.float32(0)
@@ -218,7 +230,7 @@ def _take(w, cells, slots, at, cell, left, scale, columns):  # type: ignore[no-u
         left -= part
         layer[base + j] = there - part
         kept += there > part
-    count[cell] = kept
+    columns.used[cell] = kept
     return left, slots
 
 
@@ -260,7 +272,7 @@ def _take_blend(w, side, reach, at, cell, left, scale, blend):  # type: ignore[n
 @lean_kernel
 def _look(w, side, present, top, left, rows, cols, firm, columns):  # type: ignore[no-untyped-def]
     """Surface, film and gap under the window; returns which share of the tip is on the sheet."""
-    paper, total = columns[0], columns[1]
+    paper, total = columns.paper, columns.total
     wide = _whole(side)
     if top >= 0 and left >= 0 and top + side <= rows and left + side <= cols:
         for j in range(wide):
@@ -344,8 +356,11 @@ def _weigh(w, side, reach, vx, vy, alpha, beta):  # type: ignore[no-untyped-def]
 
 
 @lean_kernel
-def _smear(w, side, reach, home, nu, columns):  # type: ignore[no-untyped-def]
+def _smear(w, side, reach, home, nu, yields, columns):  # type: ignore[no-untyped-def]
     """Push standing wax to the eight neighbours (Fig. 7); all amounts come from one snapshot.
+
+    Of what stands the share nu * pull / (pull + yields) goes, where `pull` is the sum of weights. Fig. 7 moves nu
+    of it however small the pull (yields = 0): past the level that it seeks, and back at the next contact.
 
     Wax is on its way in `arriving` when this returns (the blend has already arrived); returns the slots in use.
     """
@@ -360,15 +375,16 @@ def _smear(w, side, reach, home, nu, columns):  # type: ignore[no-untyped-def]
         standing = min(w.film[at], w.over[at])
         if standing <= np.float32(1e-3) or w.weights[at] <= 0:
             continue
-        wanted, scale = nu * standing, np.float32(1) / w.weights[at]
+        pull = w.weights[at]
+        wanted, scale = nu * standing * pull / (pull + yields), np.float32(1) / pull
         cell = _whole(home + w.where[at])
         missing, slots = _take(w, side * side, slots, at, cell, wanted, scale, columns)
         if missing > 0:
-            missing = _take_blend(w, side, reach, at, cell, missing, scale, columns[5])
+            missing = _take_blend(w, side, reach, at, cell, missing, scale, columns.blend)
             low, high = min(low, at), at + 1
         w.over[at] -= wanted
         w.film[at] -= wanted - missing
-        columns[1][cell] = w.film[at]
+        columns.total[cell] = w.film[at]
     w.begin[0], w.end[0] = edge, side * side - edge
     for slot in range(slots):
         begin, end, plane = w.begin[slot], w.end[slot], slot * size
@@ -381,7 +397,7 @@ def _smear(w, side, reach, home, nu, columns):  # type: ignore[no-untyped-def]
             begin, end = w.begin[slot], w.end[slot]
             _add_to(w.film[begin:end], w.arriving[plane + begin : plane + end])
     if high:
-        _blend_in(w, low - edge, high + edge, home, columns[1], columns[5])
+        _blend_in(w, low - edge, high + edge, home, columns.total, columns.blend)
     return slots
 
 
@@ -445,22 +461,44 @@ def _press(w, mask, worn, side, cols):  # type: ignore[no-untyped-def]
 
 
 @inner_kernel
-def _throw(number):  # type: ignore[no-untyped-def]
-    """0, 1 or 2 for each contact, in no order (Knuth's multiplicative hash, twice).
+def _luck(number):  # type: ignore[no-untyped-def]
+    """From 0 up to 1 for each whole number, in no order (Knuth's multiplicative hash, twice)."""
+    once = (number * 2654435761) & 0xFFFFFFFF
+    twice = ((once ^ (once >> 15)) * 2654435761) & 0xFFFFFFFF
+    return np.float32(twice >> 16) / np.float32(65536)
+
+
+@inner_kernel
+def _hop(contact, mean, scatter):  # type: ignore[no-untyped-def]
+    """How many cells smeared wax goes at a contact: `mean` on average, by chance up to `scatter` more or less.
 
     Wax that always went equally far would part the cells into lattices; a pattern would show as a ladder.
     """
-    once = (number * 2654435761) & 0xFFFFFFFF
-    twice = ((once ^ (once >> 15)) * 2654435761) & 0xFFFFFFFF
-    return (twice >> 16) % 3
+    return max(1, int(np.floor(mean + np.float32(0.5) + scatter * (np.float32(2) * _luck(contact) - np.float32(1)))))
+
+
+@inner_kernel
+def _grip(stroke, along):  # type: ignore[no-untyped-def]
+    """How much harder (to 1) or lighter (to -1) the crayon presses than the hand, as it sticks and slips.
+
+    along: the way so far, in lengths over which that changes.   stroke: a number that differs from stroke to stroke.
+    """
+    step = np.int64(along)
+    part = np.float32(along - step)
+    luck = (np.float32(1) - part) * _luck(stroke + step) + part * _luck(stroke + step + 1)
+    return np.float32(2) * luck - np.float32(1)
 
 
 @lean_kernel
 def _contact(w, wax, side, reach, present, x, y, force, vx, vy, stride, smears, constants, per_lambda,  # type: ignore[no-untyped-def]
              rows, cols, columns):  # fmt: skip
     """One contact, for `stride` cells of the way: adjust the height, smear, deposit (Fig. 3); returns the wax given."""
-    hop = max(1, reach - _throw(np.int64(w.hand[CONTACTS])))
+    one = np.float32(1)
+    contact = np.int64(w.hand[CONTACTS])
     w.hand[CONTACTS] += 1
+    if contact == 0:  # strokes that begin a quarter of a slip apart slip each in its own way
+        per_cell = np.float32(4) / constants.slip_cells
+        w.hand[BEGUN] = np.floor(x * per_cell) * 7919 + np.floor(y * per_cell) * 104729
     if force <= 0:
         return np.float32(0)
     # Rounding to whole cells by an even sequence of offsets leaves no stair steps.
@@ -468,27 +506,29 @@ def _contact(w, wax, side, reach, present, x, y, force, vx, vy, stride, smears, 
     top = int(np.floor(y - 0.5 + w.hand[DITHER_Y])) - side // 2
     w.hand[DITHER_X] = (w.hand[DITHER_X] + 0.7548776662) % 1.0
     w.hand[DITHER_Y] = (w.hand[DITHER_Y] + 0.5698402910) % 1.0
-    mu_paper, mu_wax, thick, rate_cell = constants[0], constants[1], constants[2], constants[3]
-    push, relief, nu_cell, alpha = constants[4], constants[5], constants[6], constants[7]
-    beta, epsilon, wear, thin = constants[8], constants[9], constants[10], constants[11]
-    heap, firm = constants[12], constants[13]
-    inside = _look(w, side, present, top, left, rows, cols, firm, columns)
+    inside = _look(w, side, present, top, left, rows, cols, constants.firm, columns)
     if inside <= 0:
         return np.float32(0)
-    wanted = force * per_lambda * inside
+    # The tip sinks until the paper bears the force.
+    grip = one + constants.slip * _grip(np.int64(w.hand[BEGUN]), contact * stride / constants.slip_cells)
+    wanted = min(force * grip * per_lambda, constants.most * present) * inside
     cells = side * side
-    h = _balance(w.over[:cells], wanted, np.float32(w.hand[HEIGHT]), min(epsilon, np.float32(0.01) * wanted))
+    allowed = min(constants.epsilon, np.float32(0.01) * wanted)
+    h = _balance(w.over[:cells], wanted, np.float32(w.hand[HEIGHT]), allowed)
     w.hand[HEIGHT] = h
     _overlap(w.over[:cells], h)
     home, slots = top * cols + left, 1
     _open(w, cells, 0, wax, 0)
     w.end[0] = cells
     if smears:
-        _weigh(w, side, hop, vx, vy, alpha, beta)
-        slots = _smear(w, side, hop, home, np.float32(1) - (np.float32(1) - nu_cell) ** stride, columns)
-    given = _deposit(w, side, reach, vx, vy, push if push > 0 else force, rate_cell * stride, thick, mu_paper, mu_wax,
-                     relief, wear, heap)  # fmt: skip
-    _settle(w, slots, home, thin, columns)
+        hop = _hop(contact, constants.hop, constants.scatter)
+        _weigh(w, side, hop, vx, vy, constants.alpha, constants.beta)
+        nu = one - (one - constants.nu) ** stride
+        slots = _smear(w, side, hop, home, nu, constants.yields, columns)
+    push = constants.push if constants.push > 0 else force
+    given = _deposit(w, side, reach, vx, vy, push, constants.rate * stride, constants.film, constants.mu_paper,
+                     constants.mu_wax, constants.relief, constants.wear, constants.heap)  # fmt: skip
+    _settle(w, slots, home, constants.thin, columns)
     return given
 
 

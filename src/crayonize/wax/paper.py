@@ -20,12 +20,18 @@ from stroke_gen.checks import did_you_mean
 
 Floats = NDArray[np.float32]
 
+FINE_MM = 0.3  # a pressed paper is smooth below waves of this length ...
+SPAN = 18.0  # ... its longest ones are so many grains long ...
+ALL_MM = 0.1  # ... and cells of this size see all of its roughness, the standard deviation of which counts as 1
+PIT = 1.1  # how many deviations below the mean its pits begin ...
+BRINK = 0.4  # ... over how many the surface turns down into them ...
+LEVEL, ROUGH, STEEP = 0.92, 0.031, 0.564  # ... and where it lies, how rough it is and how steep they are, of its depth
 PATCH = 2048  # cells along one side of the periodic patch, at most
 
 
 @dataclass(frozen=True)
 class Paper:
-    """A paper as data. `texture` is lunar, stipple, felt, or the path of a grey image."""
+    """A paper as data. `texture` is pressed, felt, lunar, stipple, or the path of a grey image."""
 
     name: str
     title: str
@@ -69,8 +75,8 @@ def _checked(paper: Paper) -> Paper:
     for key in ("name", "title", "texture", "colour"):
         if not isinstance(getattr(paper, key), str):
             raise ValueError(f"paper.{key}: {getattr(paper, key)!r} is not a text")
-    if paper.texture not in _TEXTURES and not os.path.isfile(paper.texture):
-        kinds = ", ".join(_TEXTURES)
+    if paper.texture not in _KINDS and not os.path.isfile(paper.texture):
+        kinds = ", ".join(_KINDS)
         raise ValueError(f"paper.texture: {paper.texture!r} is neither one of {kinds} nor a picture file")
     for key, low, high in (("wavelength_mm", 0.0, 20.0), ("depth_um", 0.0, 1000.0), ("pits", 0.2, 8.0)):
         value = getattr(paper, key)
@@ -92,7 +98,7 @@ def colour_linear(colour: str) -> tuple[float, float, float]:
 
 def tooth(paper: Paper, rows: int, cols: int, cell_mm: float, seed: int) -> Floats:
     """Height field (rows, cols) in um of a paper on cells of `cell_mm`."""
-    if paper.texture not in _TEXTURES:
+    if paper.texture not in _KINDS:
         return _from_picture(paper, rows, cols)
     patch = _patch(paper, (min(PATCH, _even(rows)), min(PATCH, _even(cols))), cell_mm, seed)
     high, wide = patch.shape
@@ -105,8 +111,11 @@ def tooth(paper: Paper, rows: int, cols: int, cell_mm: float, seed: int) -> Floa
 
 def _patch(paper: Paper, shape: tuple[int, int], cell_mm: float, seed: int) -> Floats:
     """One period of a texture, as heights in um."""
+    rng = np.random.default_rng([seed, 7])
+    if paper.texture == "pressed":
+        return _pressed(shape, max(paper.wavelength_mm, 0.01), cell_mm, rng) * np.float32(paper.depth_um)
     wavelength = max(paper.wavelength_mm / cell_mm, 1.0)
-    patch = _TEXTURES[paper.texture](shape, wavelength, np.random.default_rng([seed, 7]))
+    patch = _TEXTURES[paper.texture](shape, wavelength, rng)
     low, high = np.percentile(patch[:: max(1, shape[0] // 512), :: max(1, shape[1] // 512)], (0.5, 99.5))
     patch -= low
     patch /= max(high - low, np.float32(1e-12))
@@ -183,6 +192,33 @@ def _felt(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -
     return _sum(bands)
 
 
+def _pressed(shape: tuple[int, int], grain_mm: float, cell_mm: float, rng: np.random.Generator) -> Floats:
+    """Paper pressed smooth: an even surface with pits of all sizes; 0 and 1 are the percentiles 0.5 and 99.5.
+
+    Waves shorter than the cells can hold are left out, not folded into longer ones; all others have the same height
+    on cells of any size.
+    """
+    down = np.fft.fftfreq(shape[0], cell_mm).astype(np.float32)[:, None]
+    along = np.fft.rfftfreq(shape[1], cell_mm).astype(np.float32)
+    waves = np.fft.rfft2(rng.standard_normal(shape, np.float32))
+    waves *= np.sqrt(_roughness(np.hypot(down, along), grain_mm))
+    z = np.asarray(np.fft.irfft2(waves, shape), np.float32)
+    f = np.geomspace(0.02 / grain_mm, 0.5 / ALL_MM, 400)
+    z /= np.float32(cell_mm * np.sqrt(2 * np.pi * np.trapezoid(_roughness(f, grain_mm) * f * f, np.log(f))))
+    pit = np.float32(BRINK) * np.logaddexp(np.float32(0), (np.float32(-PIT) - z) / np.float32(BRINK))
+    return np.asarray(np.clip(np.float32(LEVEL) + np.float32(ROUGH) * z - np.float32(STEEP) * pit, 0, 1), np.float32)
+
+
+def _roughness(f: NDArray[Any], grain_mm: float) -> NDArray[Any]:
+    """Power of a pressed paper's waves by wave number f in 1/mm.
+
+    Scanned drawing papers fall as f^-1 down to their grain, as f^-2.3 below it, and as f^-4 where the press has
+    smoothed them.
+    """
+    slow = np.maximum(f * grain_mm, 1 / SPAN) ** -1.0
+    return np.asarray(slow * np.maximum(f * grain_mm, 1) ** -1.3 * np.maximum(f * FINE_MM, 1) ** -1.7)
+
+
 def _sum(parts: "list[Future[Floats]]") -> Floats:
     """The sum of what is being computed, in the place of the first."""
     total = parts[0].result()
@@ -199,6 +235,7 @@ def _dome(sigma: float) -> Floats:
 
 
 _TEXTURES = {"lunar": _lunar, "stipple": _stipple, "felt": _felt}
+_KINDS = ("pressed", *_TEXTURES)
 
 
 def _from_picture(paper: Paper, rows: int, cols: int) -> Floats:

@@ -9,16 +9,42 @@ Per cell: paper 4, total 4, count 1, indices 4, layer heights 16, blend 28 = 57 
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .contact import BLEND, LAYERS
+from .contact import BLEND, LAYERS, Columns
 
+WHOLE = 1.25  # hops of fewer cells than this go to the next cell
 THIN_UM = 0.4  # a film thinner than this counts as one with the layer beneath it
 
 Floats = NDArray[np.float32]
+
+
+class Constants(NamedTuple):
+    """What the kernels take of a `Physics`, for cells of one size; all float32."""
+
+    mu_paper: np.float32
+    mu_wax: np.float32
+    film: np.float32  # um
+    rate: np.float32  # per cell of the way
+    push: np.float32
+    relief: np.float32  # slope per um from one cell to the next
+    nu: np.float32  # per cell of the way
+    alpha: np.float32  # per um
+    beta: np.float32
+    yields: np.float32
+    hop: np.float32  # how far smeared wax goes, in cells
+    scatter: np.float32  # ... and how far each hop may differ from that, in cells
+    slip: np.float32
+    slip_cells: np.float32
+    most: np.float32  # mean overlap over the tip, um
+    epsilon: np.float32  # um
+    wear: np.float32
+    thin: np.float32  # um
+    heap: np.float32
+    firm: np.float32
 
 
 @dataclass(frozen=True)
@@ -37,28 +63,57 @@ class Physics:
     alpha: float  # flow smear factor, per um
     beta: float  # directional smear factor
     lam: float  # N per um of overlap and mm^2 of contact: .0005 a cell of 0.1 mm
+    bears: float  # N per mm^2 of the tip that wax bears before it yields: no hand presses harder
     epsilon_um: float  # accuracy of the force, as a sum of overlaps over cells
     firm: float  # share of the wax's height that holds the crayon up; the rest yields to it (Fig. 4 has all hold: 1)
     heap: float  # share of a cell's wax that counts as out of reach: Fig. 6 rubs on the paper alone (1)
+    yields: float  # sum of pulls at which half of what could move does: wax is a solid that yields (0: a liquid)
+    slip: float  # share of the force that comes and goes as the crayon sticks and slips ...
+    slip_mm: float  # ... over this length
     wear: float  # share of a cell's loss that deepens the cell itself; the rest the whole tip shares
 
+    def hop(self, cell_mm: float) -> tuple[float, float]:
+        """How far smeared wax goes, in cells: the mean, and how far each hop may differ from it.
+
+        Hops are whole cells. Where they are two and more they scatter, or they would part the cells into lattices.
+        """
+        cells = self.reach_mm / cell_mm
+        if cells < WHOLE:
+            return 1.0, 0.0
+        return cells, 0.5 if cells < 2 else 1.5
+
     def reach(self, cell_mm: float) -> int:
-        """How many cells smeared wax goes at most: `reach_mm`, and one more where that is several cells."""
-        cells = self._reach(cell_mm)
-        return cells + (cells > 1)
+        """How many cells smeared wax goes at most."""
+        mean, scatter = self.hop(cell_mm)
+        return int(np.ceil(mean + scatter - 0.5))
 
-    def _reach(self, cell_mm: float) -> int:
-        return max(1, round(self.reach_mm / cell_mm))
-
-    def constants(self, cell_mm: float) -> Floats:
-        """The kernel's arguments for cells of `cell_mm`."""
-        relief = self.relief / (1000 * cell_mm)
-        longer = self._reach(cell_mm) * cell_mm / self.reach_mm  # it goes by whole cells
-        nu = 1 - (1 - self.nu) ** (cell_mm / self.nu_mm / longer**2)  # as in diffusion
-        values = (self.mu_paper, self.mu_wax, self.film_um, self.rate_per_mm * cell_mm, self.push, relief,
-                  nu, self.alpha, self.beta, self.epsilon_um, self.wear, THIN_UM,
-                  self.heap, self.firm)  # fmt: skip
-        return np.array(values, np.float32)
+    def constants(self, cell_mm: float) -> Constants:
+        """The kernels' arguments for cells of `cell_mm`."""
+        hop, scatter = self.hop(cell_mm)
+        longer = hop * cell_mm / self.reach_mm  # the fewer hops it takes to be pushed as far
+        values = {
+            "mu_paper": self.mu_paper,
+            "mu_wax": self.mu_wax,
+            "film": self.film_um,
+            "rate": self.rate_per_mm * cell_mm,
+            "push": self.push,
+            "relief": self.relief / (1000 * cell_mm),
+            "nu": 1 - (1 - self.nu) ** (cell_mm / self.nu_mm / longer),
+            "alpha": self.alpha,
+            "beta": self.beta,
+            "yields": self.yields,
+            "hop": hop,
+            "scatter": scatter,
+            "slip": self.slip,
+            "slip_cells": self.slip_mm / cell_mm,
+            "most": self.bears / self.lam,
+            "epsilon": self.epsilon_um,
+            "wear": self.wear,
+            "thin": THIN_UM,
+            "heap": self.heap,
+            "firm": self.firm,
+        }
+        return Constants(**{name: np.float32(value) for name, value in values.items()})
 
 
 class Sheet:
@@ -77,10 +132,12 @@ class Sheet:
         self.layer = np.zeros((cells, LAYERS), np.float32)
         self.blend = np.zeros((cells, BLEND), np.float32)
 
-    def columns(self) -> tuple[Any, ...]:
+    def columns(self) -> Columns:
         """What the kernels take."""
-        flat = (a.reshape(-1) for a in (self.crayon, self.layer, self.blend, self.optics))
-        return self.paper, self.total, self.count, *flat
+        crayon, layer, blend = self.crayon.reshape(-1), self.layer.reshape(-1), self.blend.reshape(-1)
+        return Columns(
+            self.paper, self.total, self.count, crayon, layer, blend, self.optics.reshape(-1)
+        )
 
     def film_um(self) -> Floats:
         """Height of the wax (rows, cols) in um."""

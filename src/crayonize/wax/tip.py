@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from stroke_gen.drawing import Tip
 
 ABSENT = np.float32(1e9)
-BUMP_UM = 16.0  # about a third of a drawing paper's tooth
-BUMP_MM = 0.3  # wavelength of the bumps across the crayon's way ...
-GROOVE = 5.0  # ... and how many times longer they are along it
+BUMP_UM = 10.0  # about a quarter of a drawing paper's tooth
+BUMP_MM = 0.75  # wavelength of the bumps across the crayon's way ...
+GROOVE = 8.0  # ... and how many times longer they are along it
 SIDE_MM = 2.6  # breadth of the strip on which a lying crayon touches the paper
 DROPS_UM = {"sharp": 110.0, "blunt": 32.0, "rim": 60.0, "side": 40.0}  # centre to edge
 
