@@ -29,7 +29,7 @@ _LOCK = threading.Lock()  # a network holds the picture it looks at
 
 
 class Box(NamedTuple):
-    """Where a face may be: score 0..1, two corners (2,), and its eyes' middles (2, 2), left first."""
+    """Where a face may be: score 0..1, two corners (2,), middles of the eyes (2, 2)."""
 
     score: float
     low: Floats
@@ -50,7 +50,7 @@ def available() -> bool:
 
 @cache
 def _network(name: str) -> Any:
-    # OpenCV 5's new engine loses all outputs but one; 4 has only the classic one, and does not name it.
+    # OpenCV 5's new engine loses all outputs but one; OpenCV 4 has only the classic one.
     engine = [cv2.dnn.ENGINE_CLASSIC] if hasattr(cv2.dnn, "ENGINE_CLASSIC") else []
     return cv2.dnn.readNetFromTFLite(str(MODELS / f"{name}.tflite"), *engine)
 
@@ -66,7 +66,7 @@ def _run(name: str, picture: Floats, *outputs: str) -> Sequence[Floats]:
         try:
             network = _network(name)
             network.setInput(np.ascontiguousarray(picture.transpose(2, 0, 1)[None], np.float32))
-            return network.forward(outputs)  # type: ignore[no-any-return]
+            return network.forward(outputs)
         finally:
             cv2.setNumThreads(threads)
 
@@ -126,7 +126,7 @@ def _boxes(part: Picture, tile: tuple[slice, slice]) -> list[Box]:
     anchor = (np.stack([at % ANCHORS, at // ANCHORS], 1)[:, None] + 0.5) / ANCHORS
     corner = np.array([tile[1].start, tile[0].start])
 
-    def back(p: Floats) -> Floats:
+    def back(p: NDArray[Any]) -> Floats:
         return np.asarray(
             ((p / DETECTOR_SIDE + anchor) * DETECTOR_SIDE - [left, top]) / scale + corner,
             np.float32,

@@ -35,9 +35,9 @@ def _scan(value, high, low, distance, back):  # type: ignore[no-untyped-def]
 
 
 def saliency(lab: Floats) -> Floats:
-    """How far each place stands out from the borders, 0..1 (h, w), of a picture in OKLab (h, w, 3).
+    """How far each place of a picture in OKLab (h, w, 3) stands out from its borders, 0..1 (h, w).
 
-    The scale is absolute: where nothing stands out (a wall, a far landscape) it stays low everywhere.
+    The scale is absolute: where nothing stands out (a wall, a far landscape) it stays low.
     """
     h, w = lab.shape[:2]
     scale = min(1.0, SIDE / max(h, w))

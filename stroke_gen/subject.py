@@ -1,4 +1,4 @@
-"""Who or what the picture is of: faces, the subject's mask, skin and hair, and the care places deserve.
+"""Who or what the picture is of: faces, the subject's mask, skin and hair, and care for each place.
 
 All maps are float32 (h, w), 0..1, on the work grid; landmarks are in its cells. Left and right are
 the picture's.
@@ -6,6 +6,7 @@ the picture's.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,7 +17,7 @@ from .colour import oklab
 from .jit import lean_kernel
 from .saliency import saliency
 
-Floats = NDArray[np.float32]
+Floats = NDArray[Any]
 Focus = tuple[float, float, float, float]  # x, y, width, height in fractions of the picture
 SEARCH_SIDE = 2 * networks.DETECTOR_SIDE  # pixels of the picture in which faces are sought
 CLOSE_SIDE = 2 * networks.MESH_SIDE  # and of a patch with one face
@@ -27,7 +28,7 @@ EDGE = 2e-4  # variance of OKLab from which the guided filter takes an edge for 
 NEAR = 0.04  # long sides over which care fades out round the subject
 MANY = 12  # cells that make a sample
 
-# Landmarks along the parts of a face; each pair is (left, right), from the outer end to the inner one.
+# Landmarks along the parts of a face; pairs are (left, right), from the outer end to the inner.
 UPPER_LID = (
     (33, 246, 161, 160, 159, 158, 157, 173, 133),
     (263, 466, 388, 387, 386, 385, 384, 398, 362),
@@ -42,14 +43,15 @@ LIP_TOP = (61, 185, 40, 39, 37, 0, 267, 269, 270, 409, 291)
 LIP_BOTTOM = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291)
 MOUTH_TOP = (78, 191, 80, 81, 82, 13, 312, 311, 310, 415, 308)
 MOUTH_BOTTOM = (78, 95, 88, 178, 87, 14, 317, 402, 318, 324, 308)
-OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149,
-        150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109)  # fmt: skip
+OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377,
+        152, 148, 176, 149, 150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67,
+        109)  # fmt: skip
 CROWN, CHIN = 10, 152
 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A face: MediaPipe's 468 landmarks (468, 2), x and y in cells of the work grid, and the detector's score."""
+    """A face: MediaPipe's landmarks (468, 2), x and y in cells, and the detector's score."""
 
     landmarks: Floats
     score: float
@@ -79,7 +81,7 @@ class Face:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is drawn with care: faces, largest first, and a soft mask (h, w) of all that belongs to the subject."""
+    """What is drawn with care: faces, largest first, and a soft mask (h, w) of all of it."""
 
     faces: tuple[Face, ...]
     mask: Floats
@@ -88,9 +90,9 @@ class Subject:
 def see(photo: Floats, shape: tuple[int, int], mask: Floats | None = None) -> Subject:
     """Find faces and subject in a photo.
 
-    photo: linear light RGB (h, w, 3), as large as it comes: small faces need it.   shape: rows and columns of the work
-    grid.   mask: the subject (h, w), 0..1, of any size, if the user has drawn it; a mask of zeros means that there is
-    none. Faces outside it are not drawn as such.
+    photo: linear light RGB (h, w, 3), as large as it comes: small faces need it.   shape: rows and
+    columns of the work grid.   mask: the subject (h, w), 0..1, of any size, if the user drew it;
+    zeros mean that there is none. Faces outside it are not drawn as such.
     """
     small = _picture(photo, SEARCH_SIDE / max(photo.shape))
     found = []
@@ -108,7 +110,7 @@ def see(photo: Floats, shape: tuple[int, int], mask: Floats | None = None) -> Su
 def _standing_out(
     photo: Floats, small: NDArray[np.uint8], faces: Sequence[Face], shape: tuple[int, int]
 ) -> Floats:
-    """The mask of people, or else of what the network of people takes for one and of what is unlike the borders."""
+    """The mask of people; where no face is, of all that is unlike the borders too."""
     lab = oklab(_sized(photo, (max(1, shape[0] // 2), max(1, shape[1] // 2))))
     mask = np.zeros(lab.shape[:2], np.float32)
     if networks.available():
@@ -138,7 +140,7 @@ def _sized(level: Floats, shape: tuple[int, int]) -> Floats:
     shrink = level.shape[0] * level.shape[1] > shape[0] * shape[1]
     return cv2.resize(
         level, shape[::-1], interpolation=cv2.INTER_AREA if shrink else cv2.INTER_LINEAR
-    )  # type: ignore
+    )
 
 
 def _face(photo: Floats, scale: float, box: networks.Box, shape: tuple[int, int]) -> Face | None:
@@ -162,7 +164,7 @@ def polygons(paths: Sequence[Floats], shape: tuple[int, int]) -> Floats:
     out = np.zeros(shape, np.uint8)
     cv2.fillPoly(
         out, [np.round((path - 0.5) * 16).astype(np.int32) for path in paths], 255, cv2.LINE_AA, 4
-    )  # type: ignore
+    )
     return out / np.float32(255)
 
 
@@ -187,19 +189,17 @@ def _along_edges(level: Floats, lab: Floats, radius: float) -> Floats:
     """A map that ends where the picture has edges: guided filter, radius in long sides."""
     small = _sized(level, (lab.shape[0], lab.shape[1]))
     cells = max(2, round(radius * max(small.shape)))
-    return np.clip(cv2.ximgproc.guidedFilter(lab, small, cells, EDGE), 0, 1)  # type: ignore[no-any-return]
+    return np.clip(cv2.ximgproc.guidedFilter(lab, small, cells, EDGE), 0, 1)
 
 
 def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
-    """How much care each place deserves (h, w): faces and focus 1, the subject much, the ground round it ever less.
+    """How much care each place deserves (h, w): faces and focus 1, the ground little.
 
-    lab: the photo's OKLab on the work grid.   focus: boxes (x, y, width, height) in fractions of the picture; each is
-    taken for the ellipse that fills it, and gives way to the photo's edges.
+    lab: the photo's OKLab on the work grid.   focus: boxes (x, y, width, height) in fractions of the
+    picture; each stands for the ellipse that fills it, and gives way to edges.
     """
     shape = lab.shape[0], lab.shape[1]
-    near = soft(
-        subject.mask, NEAR * max(shape)
-    )  # what touches the subject is not quite left alone
+    near = soft(subject.mask, NEAR * max(shape))  # what touches the subject is not quite left alone
     out = np.maximum(SUBJECT_CARE * subject.mask, 0.5 * near)
     rows, cols = (np.arange(n, dtype=np.float32) + np.float32(0.5) for n in shape)
     for x, y, width, height in focus:
@@ -238,8 +238,9 @@ def skin(subject: Subject, lab: Floats) -> Floats:
 
 
 def hair(subject: Subject, lab: Floats, bare: Floats) -> Floats:
-    """Where hair is (h, w): about the heads, on the subject, where no skin is (`bare`), and alike what
-    frames the forehead.
+    """Where hair is (h, w): about the heads, on the subject, and alike what frames the forehead.
+
+    bare: where skin is.
     """
     shape = lab.shape[0], lab.shape[1]
     out = np.zeros(shape, np.float32)
@@ -256,7 +257,7 @@ def hair(subject: Subject, lab: Floats, bare: Floats) -> Floats:
 
 
 def _alike(lab: Floats, sample: Floats) -> Floats:
-    """How far colours are those of a sample, light and shadow alike: hue and strength count, lightness little."""
+    """How far colours are those of a sample, in light and in shadow: lightness counts little."""
     level = np.maximum(sample[:, :1], np.float32(0.15))
     seen = np.concatenate([sample[:, :1], sample[:, 1:] / level], 1)
     middle = np.median(seen, 0)
@@ -270,7 +271,7 @@ def _alike(lab: Floats, sample: Floats) -> Floats:
 
 @lean_kernel
 def _compare(lab, middle, spread, out):  # type: ignore[no-untyped-def]
-    """Likeness of colours to a surface: how far off in lightness, and in chroma for what light there is."""
+    """How like a surface colours are, in lightness, and in chroma for the light there is."""
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
             light = max(lab[y, x, 0], np.float32(0.15))
