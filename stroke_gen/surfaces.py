@@ -16,6 +16,7 @@ from .jit import kernel
 Floats = NDArray[np.float32]
 Labels = NDArray[np.int32]
 WEIGHTS = np.array([0.7, 1, 1], np.float32)  # shading parts a surface less than a change of hue
+FAMILIAR = np.array([0.35, 1, 1], np.float32)  # light and dark of one hue are made of the same crayons
 CARE = 0.8  # how much dearer merging is in the most important places
 EDGE = 0.7  # weight of the step along the common border beside that between the means
 SUBJECT = 0.15  # OKLab units: what parts the one who is drawn from the ground
@@ -62,7 +63,7 @@ def families(label: Labels, lab: Floats, kind: Floats, least: float) -> NDArray[
 
     kind: (h, w) differs where colours must not be mixed, as skin and cloth; least: OKLab units between families.
     """
-    means, size = _means(label, np.dstack([lab * WEIGHTS, KIND * kind, np.zeros_like(kind)]))
+    means, size = _means(label, np.dstack([lab * FAMILIAR, KIND * kind, np.zeros_like(kind)]))
     everywhere = np.ones((size.size, size.size), np.float32) - np.eye(size.size, dtype=np.float32)
     root = np.arange(size.size)
     _merge(means, size, everywhere, np.zeros_like(everywhere), np.float32(FAMILY * label.size), np.float32(0),

@@ -1,6 +1,6 @@
 """The stroke generator's table of crayons, measured on the simulator itself.
 
-Every crayon is hatched at six pressures over five grounds (bare paper, and coats of a middle and the
+Every crayon is hatched at six pressures over four grounds (bare paper, and coats of the lightest, a middle and the
 darkest crayon); a line per channel through "before, after" gives `a` and `b` of the table. The tables of
 the shipped palettes on the default paper are part of the package (`python -m crayonize.crayons.calibration` measures
 them anew); others are measured once and kept in the user's cache folder.
@@ -68,10 +68,9 @@ def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: i
 
 
 def _grounds(palette: Palette) -> list[tuple[str, float] | None]:
-    """Bare paper, a middle crayon light and heavy, the darkest crayon light and heavy."""
+    """Bare paper, and coats of the lightest crayon, a middle one and the darkest."""
     order = sorted(palette.crayons, key=lambda c: sum(c.k) / sum(c.s))
-    middle, dark = order[len(order) // 2].name, order[-1].name
-    return [None, (middle, PRESSURES[2]), (middle, PRESSURES[4]), (dark, PRESSURES[1]), (dark, PRESSURES[4])]
+    return [None, *((order[i].name, PRESSURES[3]) for i in (0, len(order) // 2, -1))]
 
 
 def _hatching(row: int, col: int, crayon: str, pressure: float, turn: int) -> Stroke:
@@ -135,7 +134,7 @@ def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: 
 
 def _key(palette: Palette, sheet_paper: paper.Paper, physics: str) -> str:
     """Changes with whatever the measured colours depend on."""
-    what = repr(("lines over paper and over wax", palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
+    what = repr(("lines over paper and over wax", 4, palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
     return hashlib.sha256(what.encode()).hexdigest()[:12]
 
 
