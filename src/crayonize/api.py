@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 from stroke_gen.checks import did_you_mean, quoted
 
 from . import __version__
-from .machine import folder as cache
-from .machine import memory
+from .machine import kernels, memory
 from .settings import Settings
 
 if TYPE_CHECKING:
@@ -178,7 +177,7 @@ def filming(
     workshop()
     from .film import plan as timelapse
 
-    cache.keep_kernels()
+    kernels.keep_kernels()
     return timelapse.Timelapse(path, seconds, show_tip, light)
 
 
@@ -320,10 +319,9 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 def workshop() -> ModuleType:
     """The pipeline with all its kernels, these from the compile cache."""
     memory.share_heaps()
-    cache.before_kernels()
     from . import pipeline
 
-    cache.keep_kernels()
+    kernels.keep_kernels()
     return pipeline
 
 

@@ -1,6 +1,5 @@
 """The two conductors: a photo becomes a Drawing, a Drawing becomes a picture."""
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -16,6 +15,7 @@ from stroke_gen.generate import generate
 from .crayons import calibration
 from .crayons.palette import Palette, load_palette
 from .light import optics
+from .machine import cores
 from .settings import Settings
 from .wax import paper, rub
 from .wax.sheet import Sheet
@@ -79,7 +79,7 @@ def easel(drawing: Drawing, size: int, threads: int | None = None, smears: bool 
     tooth = paper.tooth(sheet_paper, rows, cols, cell_mm, drawing.seed)
     sheet = Sheet(tooth, cell_mm, *_optics(palette))
     box = rub.Box(palette, rub.physics(drawing.physics), cell_mm, drawing.seed)
-    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or os.cpu_count() or 1, smears)
+    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or cores.allowed(), smears)
 
 
 def _optics(palette: Palette) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from ..machine import cores
 from . import lock, memory
 from .cluster import Cluster
 from .crew import Crew, CrewError, Workers
@@ -114,10 +115,10 @@ def _workers(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
     if options.dask:
         return Cluster(options.dask, recipe, render, options.time_limit)
     available = memory.available_bytes() if memory_limit is None else memory_limit
-    cores = memory.cores()
-    size = options.jobs or min(cores, memory.workers(available, recipe.settings.size))
+    count = cores.allowed()
+    size = options.jobs or min(count, memory.workers(available, recipe.settings.size))
     size = size if options.watch else max(1, min(size, jobs))
-    threads = recipe.settings.threads or max(1, cores // size)
+    threads = recipe.settings.threads or max(1, count // size)
     recipe = replace(recipe, settings=replace(recipe.settings, threads=threads))
     hello: dict[str, Any] = {"recipe": recipe.to_json(), "render": render, "memory": available}
     return Crew(size, hello, options.time_limit, available, folder.clean_up)
