@@ -10,8 +10,9 @@ import pytest
 from conftest import HERE, Desk, photo
 from PIL import Image
 
-from crayonize.images.metadata import kept_of
+from crayonize.images.metadata import kept
 from crayonize.images.page import fitted
+from crayonize.images.read import open_photo
 from crayonize.settings import Settings
 
 EXIF_FOLDER, GPS_FOLDER = 0x8769, 0x8825
@@ -83,7 +84,8 @@ def test_damaged_or_endless_metadata_is_left_out(desk: Desk, memory_photo: Path)
     Image.new("RGB", (8, 8)).save(desk.photos / "long.png", exif=exif)
     run = desk.run("--metadata", "all", "--format", "jpg")
     assert run.count("ok") == 62, run.said
-    assert kept_of(desk.photos / "long.png", "all") is None
+    with open_photo(desk.photos / "long.png") as long:
+        assert kept(long.picture, "all") is None
 
 
 @pytest.mark.parametrize(

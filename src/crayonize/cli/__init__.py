@@ -104,17 +104,12 @@ def _convert(words: Sequence[str]) -> int:
     options = _convert_parser().read(words)
     begun = time.monotonic()
 
-    from stroke_gen import params
-
     from .. import api, batch
-    from ..crayons.palette import load_palette
 
     paths = [path for path in (options.photo, options.out, *options.more) if path is not None]
     folders = batch.inputs_and_output(paths, options.output)
     chosen = {f.name: getattr(options, f.name) for f in fields(Settings) if f.name in options}
     settings = api.settings_of(chosen | {"focus": tuple(options.focus)})
-    load_palette(settings.palette)
-    params.with_force(params.load_style(settings.style), settings.force)
     if folders:
         if options.timelapse or options.legend:
             raise ValueError("--timelapse and --legend are for one photo")
@@ -123,14 +118,16 @@ def _convert(words: Sequence[str]) -> int:
     photo = Path(options.photo)
     out = options.out or options.output or photo.with_name(f"{photo.stem}.crayon.png")
     batch.check_alone(options)
-    api.check_outputs([photo, *api.used_files(settings)], out, options.strokes, options.timelapse)
+    api.check_outputs([photo, *settings.files()], out, options.strokes, options.timelapse)
     if options.out is not None:
         _spare_photo(options.out)
-    settings = page.fitted_to(settings, options.print, options.dpi, photo)
-    with _talk(options) as progress:
+    from ..images.read import open_photo
+
+    with _talk(options) as progress, open_photo(photo) as opened:
+        settings = page.fitted(settings, options.print, options.dpi, opened.width, opened.height)
+        kept = metadata.kept(opened.picture, options.metadata)
         with api.filming(options.timelapse, options.seconds, options.show_tip, options.light) as watch:
-            drawing, easel = api.sketch(options.photo, settings, progress, watch)
-        kept = metadata.kept_of(photo, options.metadata)
+            drawing, easel = api.sketch(opened, settings, progress, watch)
         api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings, kept=kept,
                    legend=options.legend)  # fmt: skip
     if options.verbose or (options.out is None and not options.quiet):

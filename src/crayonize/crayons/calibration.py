@@ -18,7 +18,7 @@ from stroke_gen.drawing import Stroke, Tip
 from stroke_gen.swatches import Swatches
 
 from ..light import optics
-from ..machine import cores, folder, kernels
+from ..machine import cores, folder, kernels, source
 from ..settings import Settings
 from ..wax import paper, rub
 from ..wax.sheet import Sheet
@@ -114,11 +114,14 @@ def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArr
 
 
 def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
-    """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured now."""
+    """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured now.
+
+    A kept one counts for the version of the wax that it was measured on; a shipped one is of its own version.
+    """
     name = f"{palette.name}-{_key(palette, sheet_paper, physics)}.npz"
     if (SHIPPED / name).is_file():
         return _unpacked((SHIPPED / name).read_bytes())
-    kept = folder.folder() / name
+    kept = folder.folder() / f"{source.of_the_wax()}-{name}"
     content = folder.read(kept)
     if content is None:
         content = _packed(measure(palette, sheet_paper, physics, threads))

@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from .folder import folder, read, write
+from .source import hash_of
 
 KEEP = 3  # latest versions of a compiled kernel, and latest machines or versions of numba
 IN_USE_S = 3600.0  # a folder used within this time is never cleaned up
@@ -151,9 +152,3 @@ def _source_hash(module: str) -> str:
             if isinstance(thing, Dispatcher) and thing.py_func.__module__ not in modules:
                 modules.append(thing.py_func.__module__)
     return hash_of(files)
-
-
-def hash_of(files: Iterable[Path]) -> str:
-    """A short name for the content of files, in whatever order and wherever they lie."""
-    hashes = sorted(hashlib.sha256(file.read_bytes()).digest() for file in files)
-    return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]
