@@ -125,7 +125,9 @@ def test_help_and_planning_load_nothing_heavy(tmp_path: Path) -> None:
     photo(tmp_path / "in" / "a.png")
     code = f"""
 import sys
-from crayonize.batch import Options, Recipe, run
+from crayonize.batch.conductor import run
+from crayonize.batch.job import Recipe
+from crayonize.batch.options import Options
 from crayonize.settings import Settings
 assert run([{str(tmp_path / "in")!r}], {str(tmp_path / "out")!r}, Options(quiet=True), Recipe(Settings()),
            render="stand_in:sketch") == 0

@@ -29,10 +29,17 @@ def run(
     output: str,
     options: Options,
     recipe: Recipe,
-    render: str | None,
-    memory_limit: int | None,
+    *,
+    render: str | None = None,
+    memory_limit: int | None = None,
 ) -> int:
-    """What batch.run promises."""
+    """Draw all photos of folders or a list into a folder; returns the exit code.
+
+    render: "module:function" in place of `api.sketch`, for tests.   memory_limit: bytes for all workers, in
+    place of what the machine has. ValueError for what the caller can mend before anything is done, OSError if
+    the output folder cannot be used, ImportError for an extra that is missing. 0 all done, 1 stopped, 3 some
+    failed, 4 another run holds the folder, 128 + n stopped by signal n.
+    """
     fields = _fields(recipe)
     check_template(options.name, fields)
     paths = sources(inputs)

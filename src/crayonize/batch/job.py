@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..machine import source
+from ..machine.memory import MAX_PIXELS
 from ..settings import Settings
 
 STATUSES = ("ok", "failed", "died", "timeout", "skipped", "ignored", "not_run")
 
-MAX_PIXELS = 250_000_000
 MAX_BYTES = 1 << 30
 TIME_LIMIT = 1800.0
 
