@@ -23,7 +23,7 @@ def start(source: object, target: object, *words: str, **env: str) -> Batch:
     """Run a batch between URLs to its end."""
     path = os.pathsep.join(map(str, (ROOT / "src", ROOT, HERE)))
     batch = Batch([source], target, ["-j", "2", *words], [], env={**os.environ, "PYTHONPATH": path, **env})  # type: ignore[list-item,arg-type]
-    batch.end(120)
+    batch.end()
     return batch
 
 

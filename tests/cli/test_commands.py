@@ -329,7 +329,7 @@ def test_signals_end_it_quietly(photo, tmp_path, number, code):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "ready\n"
     process.send_signal(number)
-    assert (*process.communicate(timeout=30), process.returncode) == ("", "", code)
+    assert (*process.communicate(timeout=300), process.returncode) == ("", "", code)
     assert list(tmp_path.iterdir()) == []
 
 
