@@ -166,10 +166,10 @@ def filming(
     if path is None:
         return nullcontext()
     workshop()
-    from .film import plan as timelapse
+    from .film.plan import Timelapse
 
     kernels.keep_kernels()
-    return timelapse.Timelapse(path, seconds, show_tip, light)
+    return Timelapse(path, seconds, show_tip, light)
 
 
 def sketch(

@@ -141,16 +141,17 @@ def _bench(words: Sequence[str]) -> int:
 
     from stroke_gen.files import whole_file
 
-    from ..bench import parts as bench
+    from ..bench import measure
+    from ..bench.table import table
 
     aside = options.json is not None and options.json != "-"
     with whole_file(options.json) if aside else nullcontext() as part, talk(options) as progress:
         if part:
             part.touch()  # better now than after some minutes
-        found = bench.measure(options.quick, progress)
+        found = measure.measure(options.quick, progress)
         if part:
             part.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
-    print(json.dumps(found, indent=1) if options.json == "-" else bench.table(found))
+    print(json.dumps(found, indent=1) if options.json == "-" else table(found))
     return 0
 
 
