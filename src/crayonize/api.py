@@ -57,18 +57,38 @@ def convert(
 ) -> Image | NDArray[np.uint8] | Path:
     """Draw a photo with wax crayons.
 
-    image: a path, a Pillow image, or an array as `image_read.read_linear` takes it.
+    Parameters
+    ----------
+    image: a path, a Pillow image, or an array (h, w), (h, w, 3) or (h, w, 4) of uint8, uint16 or
+        sRGB-encoded floats 0..1.
     out: where to write the drawing (PNG, JPEG, WebP or TIFF), with settings and seed inside.
-    strokes: where to save the strokes (.json), from which `draw` makes the same picture at any size; .svg for
-        other programs.
-    timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4), `seconds` long; show_tip: with the
-        crayon in view.   legend: put the crayons used beside the picture.
-    light: shade the relief of paper and wax.   progress: called with a name and the share done, 0..1.
-    choices: any field of `Settings` (palette, paper, style, force, size, seed, threads, preview, focus, ...).
+    strokes: where to save the strokes: .json, from which `draw` makes the same picture at any
+        size, or .svg for other programs.
+    timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4).
+    seconds: length of the film, 3 to 600.
+    show_tip: with the crayon in the film.
+    legend: put the crayons used beside the picture.
+    light: shade the relief of paper and wax.
+    progress: called with the name of what is being done and the share done, 0..1.
+    **choices: any field of `Settings` (palette, paper, style, force, size, seed, ...).
 
-    Returns the same kind as `image`: an array gives uint8 sRGB (h, w, 3), a Pillow image a Pillow image, a
-    path the path `out`, or a Pillow image if there is no `out`. ValueError, one line, for what the caller
-    can mend; TypeError for an unknown choice; OSError if a file cannot be written.
+    Returns
+    -------
+    The same kind as `image`: for an array uint8 sRGB (h, w, 3), for a Pillow image one, for a path
+    the path `out`, or a Pillow image if there is no `out`.
+
+    Raises
+    ------
+    ValueError: one line, for what the caller can mend.
+    TypeError: for an unknown choice.
+    OSError: if a file cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> sky = np.full((40, 60, 3), (120, 170, 230), np.uint8)
+    >>> convert(sky, size=90, style="sketch", seed=1).shape
+    (60, 90, 3)
     """
     import numpy as np
     from PIL import Image
@@ -95,9 +115,34 @@ def draw(
     light: bool = True,
     progress: Progress | None = None,
 ) -> NDArray[np.uint8]:
-    """The picture of a Drawing, or of a drawing's file: uint8 sRGB (h, w, 3), its long side `size` pixels.
+    """The picture of a Drawing, or of a drawing's file.
 
-    preview: without smearing and at half the size. The rest, and the errors, as in `convert`.
+    Parameters
+    ----------
+    drawing: a `stroke_gen.drawing.Drawing`, or the path of one as .json, or of lines as .svg.
+    size: long side of the picture in pixels, 1 to 20000.
+    out: where to write the picture as well.
+    threads: at most so many at once; they change nothing in the picture. None: all cores.
+    preview: without smearing and at half the size.
+    light, progress: as in `convert`.
+
+    Returns
+    -------
+    uint8 sRGB (h, w, 3).
+
+    Raises
+    ------
+    ValueError: one line, naming the stroke and the field that is wrong.
+    OSError: if `out` cannot be written.
+
+    Examples
+    --------
+    >>> from stroke_gen.drawing_file import drawing_from_json
+    >>> line = {"crayon": "red", "path": [[10, 10], [90, 50]]}
+    >>> drawing = drawing_from_json({"format": "crayonize drawing", "version": 1, "sheet_mm": [100, 60],
+    ...                              "paper": "smooth", "palette": "box8", "strokes": [line]})
+    >>> draw(drawing, size=200).shape
+    (120, 200, 3)
     """
     return finish(*redraw(drawing, size, threads, preview, progress, out=out), out, light=light)
 
