@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,11 +72,11 @@ def _stages(
         yield faces
         yield lines
     for coat in style.passes:
-        if coat.kind != "touch":
-            for turn in range(LAYERS) if coat.kind == "fill" else [None]:
-                yield lambda now, coat=coat, turn=turn: _fill(plan, now, inside * (1 - white), coat, turn, style, rng)
-        else:
-            yield lambda now, coat=coat: _touch(plan, now, inside * (1 - features), coat, style, rng)
+        if coat.kind == "touch":
+            yield partial(_touch, plan, inside=inside * (1 - features), coat=coat, style=style, rng=rng)
+            continue
+        for turn in range(LAYERS) if coat.kind == "fill" else (None,):
+            yield partial(_fill, plan, inside=inside * (1 - white), coat=coat, turn=turn, style=style, rng=rng)
     yield faces
     yield lines
 
@@ -89,7 +90,7 @@ def _plan(seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generato
 def _fill(
     plan: Plan, now: Floats, inside: Floats, coat: Pass, turn: int | None, style: Style, rng: np.random.Generator
 ) -> list[Stroke]:
-    """One layer of the mixtures, or all once more, crayon by crayon, light to dark: wide in the ground, finer where care is due."""
+    """One layer of the mixtures, or all once more, light to dark: wide in the ground, finer where care is due."""
     seen = plan.scene
     wide = coat.tip * style.tip_mm / seen.cell_mm
     wants = separation.plates(plan, blur(now, 0.5 * wide), turn, coat.dark_price)

@@ -68,5 +68,7 @@ def read(
     coherence = np.hypot(field[..., 0], field[..., 1]) / (field[..., 2] + 1e-6)
     fine = np.clip(care * 1.5, 0, 1)[..., None]
     guide = Guide((calm * (1 - fine) + lab * fine).astype(np.float32), WINDOW * tip)
-    worth = detail.result() * (0.35 + 0.65 * care)
-    return Scene(target, lab, natural, guide, label, family, tangent, coherence, subject, skin, hair, care, worth, cell_mm)
+    worth = (detail.result() * (0.35 + 0.65 * care)).astype(np.float32)
+    return Scene(
+        target, lab, natural, guide, label, family, tangent, coherence, subject, skin, hair, care, worth, cell_mm
+    )

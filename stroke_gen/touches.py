@@ -146,7 +146,8 @@ def _worthiest(
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
     own = np.stack([(plan.mixtures.layers == k).any(1) for k in range(len(swatches.names))])
     body = (seen.skin, foreign(swatches, SKIN_RAD)), (seen.hair, foreign(swatches, HAIR_RAD))
-    asked = cv2.dilate(need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells)))
+    near = cv2.dilate(need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells)))
+    asked = np.asarray(near, np.uint8)
 
     def worth(k: int) -> Floats:
         gain, _ = gains(now, aim, (0, 0), asked, swatches, k, coat)

@@ -143,8 +143,10 @@ def sketch(
             stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
         done += 1
 
-    strokes = generator.generate(photo, who, width_mm, height_mm, table, style, settings.seed, draw=draw, look=stand.seen,
-                       threads=stand.threads, focus=settings.focus)  # fmt: skip
+    strokes = generator.generate(
+        photo, who, width_mm, height_mm, table, style, settings.seed,
+        draw=draw, look=stand.seen, threads=stand.threads, focus=settings.focus,
+    )  # fmt: skip
     drawing = Drawing(
         width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed
     )

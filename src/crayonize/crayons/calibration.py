@@ -136,7 +136,7 @@ def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: 
 
 def _key(palette: Palette, sheet_paper: paper.Paper, physics: str) -> str:
     """Changes with whatever the measured colours depend on."""
-    what = repr(("lines over paper and over wax", 4, palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
+    what = repr((palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
     return hashlib.sha256(what.encode()).hexdigest()[:12]
 
 
