@@ -4,8 +4,8 @@
 
     convert("photo.jpg", "out.png", palette="box24", seed=1)
 
-`Live` is a sheet to draw on by hand. Importing this is cheap; numpy, numba and OpenCV are loaded by the first
-call, or with `Live`.
+`Live` is a sheet to draw on by hand. Importing this is cheap; numpy, numba and OpenCV are loaded by
+the first call, or with `Live`.
 """
 
 from typing import TYPE_CHECKING, Any
