@@ -48,11 +48,11 @@ def convert(words: Sequence[str]) -> int:
 
     with talk(options) as progress, open_photo(photo) as opened:
         settings = page.fitted(settings, options.print, options.dpi, opened.width, opened.height)
-        kept = metadata.kept(opened.picture, options.metadata)
         with api.filming(
             options.timelapse, options.seconds, options.show_tip, options.light
         ) as watch:
             drawing, easel = api.sketch(opened, settings, progress, watch)
+        kept = metadata.kept(opened.exif, options.metadata)
         api.finish(
             drawing,
             easel,
