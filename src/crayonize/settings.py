@@ -43,7 +43,8 @@ class Settings:
     preview: bool = False
     age: int | None = None  # of the one who draws, 3 to 10, for style child
     left_handed: bool = False  # hatching from upper left to lower right
-    focus: tuple[tuple[float, float, float, float], ...] = ()  # boxes x, y, w, h in fractions of the picture
+    # boxes x, y, w, h in fractions of the picture
+    focus: tuple[tuple[float, float, float, float], ...] = ()
 
     @cached_property
     def box(self) -> Palette:

@@ -57,9 +57,14 @@ def measured(monkeypatch: pytest.MonkeyPatch, tmp_path) -> list[str]:
         names.append(palette.name)
         shape = (len(palette.crayons), len(calibration.PRESSURES))
         crayons = tuple(crayon.name for crayon in palette.crayons)
-        return Swatches(crayons, np.array(calibration.PRESSURES, np.float32), np.zeros((*shape, 3), np.float32),
-                        np.ones((*shape, 3), np.float32), np.zeros(shape, np.float32),
-                        np.ones(3, np.float32))  # fmt: skip
+        return Swatches(
+            crayons,
+            np.array(calibration.PRESSURES, np.float32),
+            np.zeros((*shape, 3), np.float32),
+            np.ones((*shape, 3), np.float32),
+            np.zeros(shape, np.float32),
+            np.ones(3, np.float32),
+        )
 
     monkeypatch.setattr(calibration, "measure", measure)
     monkeypatch.setenv("CRAYONIZE_CACHE", str(tmp_path / "cache"))
@@ -86,7 +91,10 @@ def test_shipped_palettes_are_not_measured(measured: list[str]) -> None:
 
 
 def test_shipped_tables_are_those_of_this_wax() -> None:
-    """Measured anew: no crayon gives another colour on paper than the table says. Else: run calibration."""
+    """Measured anew: no crayon gives another colour on paper than the table says.
+
+    Else: run calibration.
+    """
     box = replace(load_palette("box8"), crayons=load_palette("box8").crayons[:3])
     shipped = calibration.swatches(load_palette("box8"), PAPER, "metric", 1)
     fresh = calibration.measure(box, PAPER, "metric", 2)
