@@ -27,7 +27,7 @@ LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
-DARK_PRICE = 0.12  # for a crayon darker than the surface's darkest, times the difference of lightness
+DARK_PRICE = 0.2  # for a crayon darker than the surface's darkest, times the difference of lightness
 BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
 WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
@@ -223,7 +223,7 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
     loud = np.linalg.norm(hue, axis=1)
     price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
     darkest = np.percentile(sample[:, 0], 10, axis=1)
-    price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.15, 0)
+    price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.08, 0)
     return price.astype(np.float32)
 
 
