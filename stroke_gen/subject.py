@@ -195,7 +195,7 @@ def _along_edges(level: Floats, lab: Floats, radius: float) -> Floats:
 def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
     """How much care each place deserves (h, w): faces and focus 1, the ground little.
 
-    lab: the photo's OKLab on the work grid.   focus: boxes (x, y, width, height) in fractions of the
+    lab: the photo's OKLab on the work grid.   focus: boxes (x, y, width, height) in parts of the
     picture; each stands for the ellipse that fills it, and gives way to edges.
     """
     shape = lab.shape[0], lab.shape[1]
@@ -205,10 +205,10 @@ def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
     for x, y, width, height in focus:
         across = (cols / shape[1] - x - width / 2) / max(width / 2, 1e-3)
         along = (rows / shape[0] - y - height / 2) / max(height / 2, 1e-3)
-        ellipse = _fall(np.hypot(along[:, None], across))
-        size = 0.1 * max(width * shape[1], height * shape[0]) / max(shape)
-        kept = _sized(_along_edges(ellipse, np.ascontiguousarray(lab[::2, ::2]), size), shape)
-        out = np.maximum(out, np.maximum(0.6 * ellipse, kept))
+        radius = np.hypot(along[:, None], across)
+        size = 0.25 * max(width * shape[1], height * shape[0]) / max(shape)
+        kept = _along_edges(_fall(radius), np.ascontiguousarray(lab[::2, ::2]), size)
+        out = np.maximum(out, np.maximum(_fall(1.3 * radius), _sized(kept, shape)))
     for face in subject.faces:
         oval = _oval(face, shape, 1.05)
         out = np.maximum(out, np.maximum(oval, soft(_oval(face, shape, 1.2), 0.08 * face.height)))
@@ -252,7 +252,7 @@ def hair(subject: Subject, lab: Floats, bare: Floats) -> Floats:
         forehead = _along(face, shape) < (face.path((33, 263)) @ face.down).mean()
         sample = lab[(_oval(face, shape, 1.3) - _oval(face, shape)) * free * forehead > 0.5]
         if len(sample) > MANY:
-            out = np.maximum(out, head * free * _alike(lab, sample) ** 2)
+            out = np.maximum(out, head * free * _alike(soft(lab, 0.02 * face.height), sample) ** 2)
     return soft(out)
 
 
