@@ -15,6 +15,7 @@ Floats = NDArray[np.float32]
 WORK_LONG = 640  # cells along the work grid's long side
 RIM = 0.006  # of the long side: a frame that is not drawn
 WIDE = 3.0  # cells: wide enough a bell to look smooth on its grid
+KNEE = 0.15  # OKLab L above the darkest crayon from which tones are kept
 WARM = np.deg2rad(58)  # OKLab hue of skin
 
 
@@ -121,14 +122,21 @@ def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:
     return np.ascontiguousarray(np.dstack([c * x - s * y, s * x + c * y]), np.float32)
 
 
+def _toe(lightness: Floats, low: float, darkest: float) -> Floats:
+    """Lightness that stays as it is from KNEE above `darkest` and is drawn together below, `low` to `darkest`."""
+    knee = darkest + KNEE
+    if low >= darkest:
+        return lightness
+    depth = np.clip((knee - lightness) / (knee - low), 0, 1)
+    return np.where(depth > 0, knee - KNEE * (1 - (1 - depth) ** ((knee - low) / KNEE)), lightness).astype(np.float32)
+
+
 def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
     """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in order."""
     given = np.append(swatches.lightness(), oklab(swatches.paper)[0])  # on dark paper crayons are the light
     darkest, lightest = float(given.min()), float(given.max())
     out = lab.copy()
-    low, high = np.percentile(lab[..., 0], (0.5, 99.5))
-    low, high = min(float(low), darkest + 0.02), max(float(high), lightest)
-    out[..., 0] = darkest + (np.clip(lab[..., 0], low, high) - low) / max(high - low, 1e-6) * (lightest - darkest)
+    out[..., 0] = np.minimum(_toe(lab[..., 0], float(np.percentile(lab[..., 0], 0.5)), darkest), lightest)
     out[..., 0] += 4 * style.lift * out[..., 0] * (1 - out[..., 0])
     chroma = np.hypot(lab[..., 1], lab[..., 2])
     warm = np.clip((lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1)

@@ -22,7 +22,7 @@ from .mixing import BODY_PRICE, SKIN_RAD, foreign
 from .params import Style
 from .scene import Scene
 from .separation import Plan
-from .swatches import Swatches
+from .swatches import Swatches, firmness
 
 Floats = NDArray[np.float32]
 SCALE = 2  # edge pixels per work cell
@@ -221,4 +221,4 @@ def _crayons(lines: Lines, scene: Scene, now: Floats, box: Swatches, style: Styl
     skin = _means(_sample(scene.skin, lines.points), lines.first)
     off += BODY_PRICE * skin[:, None, None] * foreign(box, SKIN_RAD)[None, :, None]
     k, p = np.divmod(off.reshape(len(off), math.prod(off.shape[1:])).argmin(1), off.shape[2])
-    return k, box.pressures[hardest][p] * np.float32(style.line_press)
+    return k, box.pressures[hardest][p] * np.float32(style.line_press * firmness(style.line_tip * style.tip_mm))

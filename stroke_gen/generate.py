@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from .params import Pass, Style
 from .scene import Scene
 from .separation import Plan
 from .subject import Subject
-from .swatches import Swatches
+from .swatches import Swatches, firmness
 
 Floats = NDArray[np.float32]
 CROSS = (0, -1, 1, -2)  # turns of the direction from layer to layer, in `cross`
@@ -71,11 +72,11 @@ def _stages(
         yield faces
         yield lines
     for coat in style.passes:
-        if coat.kind != "touch":
-            for turn in range(LAYERS) if coat.kind == "fill" else [None]:
-                yield lambda now, coat=coat, turn=turn: _fill(plan, now, inside * (1 - white), coat, turn, style, rng)
-        else:
-            yield lambda now, coat=coat: _touch(plan, now, inside * (1 - features), coat, style, rng)
+        if coat.kind == "touch":
+            yield partial(_touch, plan, inside=inside * (1 - features), coat=coat, style=style, rng=rng)
+            continue
+        for turn in range(LAYERS) if coat.kind == "fill" else (None,):
+            yield partial(_fill, plan, inside=inside * (1 - white), coat=coat, turn=turn, style=style, rng=rng)
     yield faces
     yield lines
 
@@ -89,7 +90,7 @@ def _plan(seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generato
 def _fill(
     plan: Plan, now: Floats, inside: Floats, coat: Pass, turn: int | None, style: Style, rng: np.random.Generator
 ) -> list[Stroke]:
-    """One layer of the mixtures, or all once more, crayon by crayon, light to dark: wide in the ground, finer where care is due."""
+    """One layer of the mixtures, or all once more, light to dark: wide in the ground, finer where care is due."""
     seen = plan.scene
     wide = coat.tip * style.tip_mm / seen.cell_mm
     wants = separation.plates(plan, blur(now, 0.5 * wide), turn, coat.dark_price)
@@ -123,13 +124,13 @@ def _hatched(
 ) -> list[Stroke]:  # fmt: skip
     """Hatching of (crayon, tip in usual tips, pressure (h, w)), in that order."""
     seen, names = plan.scene, plan.swatches.names
-    hold = replace(style, press=style.press * coat.press)
     jobs = list(zip(parts, rng.spawn(len(parts)), strict=True))
 
     def drawn(job: tuple[tuple[int, float, Floats], np.random.Generator]) -> list[Stroke]:
         (k, factor, want), own = job
         tip = Tip("sharp" if coat.sharp else "blunt", round(factor * style.tip_mm, 3))  # as the file rounds it
         cells = tip.width_mm / seen.cell_mm
+        hold = replace(style, press=style.press * coat.press * firmness(tip.width_mm))
         how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs,
                              coat.gap * cells, coat.single)  # fmt: skip
         paths = hatching.hatch(want, gaps, tangent, seen.coherence, how, own)

@@ -162,7 +162,9 @@ def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing, shortest, reach
     return strokes
 
 
-def hatch(want: Floats, gaps: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator) -> Paths:
+def hatch(
+    want: Floats, gaps: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator
+) -> Paths:
     """Zigzags over want > 0, whose values are the pressure; gaps (h, w) widen the spacing; paths in work cells."""
     h, w = want.shape
     seeds = _seeds(want, how, rng)

@@ -8,6 +8,7 @@ that opposes the surface's, grey in a colour, black in the light). One box serve
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +16,14 @@ from numpy.typing import NDArray
 from .colour import TO_LAB, TO_LMS, cube_root, oklab
 from .jit import inner_kernel, kernel
 from .scene import Scene
-from .swatches import Swatches
+from .swatches import COVERED, Swatches
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
 LAYERS = 4  # crayons in a mixture at most
 SAMPLES = 24  # colours by which a surface is judged
-GRAIN_PRICE = 0.5  # OKLab units per unit of grain
-LAYER_PRICE = 0.01  # for each further crayon
+GRAIN_PRICE = 0.15  # OKLab units per unit of grain
+LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
@@ -32,6 +33,26 @@ WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
 BEAM = 3  # mixtures of each length that are tried with one crayon more
 FEW = np.array([0, 1, 3, 4, 6])  # pressures of four crayons; of three and fewer all are tried
+
+
+class Wax(NamedTuple):
+    """What kernels need of the swatches."""
+
+    paper: Floats  # (3,) linear
+    covered: np.float32  # how far from the paper's light a waxed ground is
+    a: Floats  # (2, crayons, pressures, 3), as in Swatches
+    b: Floats
+    grain: Floats  # (crayons, pressures)
+    dull: Floats  # (crayons,) lightness of each laid heavily
+    to_lms: Floats
+    to_lab: Floats
+    grain_price: np.float32
+
+
+def wax(swatches: Swatches) -> Wax:
+    """The swatches as kernels take them."""
+    return Wax(swatches.paper, np.float32(COVERED), swatches.a, swatches.b, swatches.grain, swatches.lightness(),
+               TO_LMS, TO_LAB, np.float32(GRAIN_PRICE))  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +85,14 @@ def _lab(light, to_lms, to_lab, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def combine(ground, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price):  # type: ignore[no-untyped-def]
+def combine(ground, crayons, pressures, wax, colour, price):  # type: ignore[no-untyped-def]
     """OKLab (choices, 3) and price of grain of every choice of pressures for crayons laid over a ground.
 
+
     crayons: lightest first; pressures: which of the table's, 0 for none, 1 for its first. Choices count the first
-    crayon's pressure slowest. dull: (crayons of the box,) lightness of each laid heavily.
+    crayon's pressure slowest.
     """
+    a, b, paper = wax.a, wax.b, wax.paper
     count, levels = crayons.size, pressures.size
     total = levels**count
     light = np.empty(3, np.float32)
@@ -85,15 +108,18 @@ def combine(ground, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain
             if p < 0:
                 continue
             k = crayons[n]
-            through = (a[k, p, 0] + a[k, p, 1] + a[k, p, 2]) / 3
+            off = max(max(abs(light[0] - paper[0]), abs(light[1] - paper[1])), abs(light[2] - paper[2]))
+            waxed = min(off / wax.covered, np.float32(1))
+            through = (a[0, k, p, 0] + a[0, k, p, 1] + a[0, k, p, 2]) / 3
             below = np.float32(0.2126) * light[0] + np.float32(0.7152) * light[1] + np.float32(0.0722) * light[2]
             # Flecks below are covered by as much as the crayon hides; its own show by how far it differs.
-            depth = abs(np.sqrt(below) - dull[k]) / (np.float32(1) - min(dull[k], np.float32(0.8)))
-            dots = dots * through + grain[k, p] * min(depth, np.float32(1))
+            depth = abs(np.sqrt(below) - wax.dull[k]) / (1 - min(wax.dull[k], np.float32(0.8)))
+            dots = dots * through + wax.grain[k, p] * min(depth, np.float32(1))
             for c in range(3):
-                light[c] = a[k, p, c] * light[c] + b[k, p, c]
-        _lab(light, to_lms, to_lab, colour[m])
-        price[m] = grain_price * dots
+                bare, over = a[0, k, p, c] * light[c] + b[0, k, p, c], a[1, k, p, c] * light[c] + b[1, k, p, c]
+                light[c] = bare + waxed * (over - bare)
+        _lab(light, wax.to_lms, wax.to_lab, colour[m])
+        price[m] = wax.grain_price * dots
 
 
 @kernel
@@ -113,7 +139,7 @@ def _cost(sample, colour, price, number):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _try(sample, mixtures, extra, allowed, paper, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, cost):  # type: ignore[no-untyped-def]
+def _try(sample, mixtures, extra, allowed, pressures, wax, cost):  # type: ignore[no-untyped-def]
     """cost (surfaces, mixtures) of mixtures (m, n), with the prices `extra` (surfaces, crayons) of their crayons."""
     length = mixtures.shape[2]
     total = pressures.size**length
@@ -129,7 +155,7 @@ def _try(sample, mixtures, extra, allowed, paper, pressures, a, b, grain, dull, 
             if not usable:
                 cost[g, q] = 9
                 continue
-            combine(paper, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price)
+            combine(wax.paper, crayons, pressures, wax, colour, price)
             cost[g, q] = _cost(sample[g], colour, price, total) + dear
 
 
@@ -141,19 +167,19 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
                   for m in (seen.skin, seen.hair))  # fmt: skip
     extra = prices(sample, swatches) + np.float32(LAYER_PRICE)
     extra += BODY_PRICE * (skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD))
-    every = np.ones(len(order), np.bool_)
+    every, table = np.ones(len(order), np.bool_), wax(swatches)
 
     def tried(mixtures: Ints, allowed: NDArray[np.bool_], pressures: Ints) -> Floats:
         cost = np.empty(mixtures.shape[:2], np.float32)
-        _try(sample, mixtures, extra, allowed, swatches.paper, pressures, swatches.a, swatches.b, swatches.grain,
-             swatches.lightness(), TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), cost)  # fmt: skip
+        _try(sample, mixtures, extra, allowed, pressures, table, cost)
         return cost
 
     full = np.arange(len(swatches.pressures) + 1)
     single = np.broadcast_to(order[None, :, None], (len(sample), len(order), 1)).copy()
     one = tried(single, every, full)
     number = len(order)
-    pairs = np.array([(order[i], order[j]) for i in range(number) for j in range(i + 1, number)], np.int64).reshape(-1, 2)
+    first, second = np.triu_indices(number, 1)
+    pairs = np.stack([order[first], order[second]], 1)
     double = np.broadcast_to(pairs[None], (len(sample), *pairs.shape)).copy()
     two = tried(double, every, full)
     allowed = _box(np.hstack([one, two]), [[int(k)] for k in order] + pairs.tolist(), size, number, most)

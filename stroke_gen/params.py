@@ -20,7 +20,7 @@ class Pass:
     """One coat of hatching over the whole sheet, after a look at what is there."""
 
     name: str = "coat"
-    kind: Annotated[str, "fill", "add", "touch"] = "fill"  # the mixtures, layer by layer; once more where needed; shapes
+    kind: Annotated[str, "fill", "add", "touch"] = "fill"  # the mixtures in layers; once more; shapes
     tip: Annotated[float, 0.2, 4] = 1.0  # width of the tip, in usual tips
     fine: Annotated[float, 0.2, 4] = 0.65  # the same where care is due
     sharp: bool = False  # a sharpened tip

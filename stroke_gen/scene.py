@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from . import analysis, surfaces
 from . import subject as seeing
-from .analysis import blur
 from .colour import from_oklab, oklab
 from .guide import Guide
 from .params import Style
@@ -70,4 +68,7 @@ def read(
     coherence = np.hypot(field[..., 0], field[..., 1]) / (field[..., 2] + 1e-6)
     fine = np.clip(care * 1.5, 0, 1)[..., None]
     guide = Guide((calm * (1 - fine) + lab * fine).astype(np.float32), WINDOW * tip)
-    return Scene(target, lab, natural, guide, label, family, tangent, coherence, subject, skin, hair, care, detail.result() * (0.35 + 0.65 * care), cell_mm)
+    worth = (detail.result() * (0.35 + 0.65 * care)).astype(np.float32)
+    return Scene(
+        target, lab, natural, guide, label, family, tangent, coherence, subject, skin, hair, care, worth, cell_mm
+    )

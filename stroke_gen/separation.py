@@ -12,10 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .scene import Scene
-from .colour import TO_LAB, TO_LMS
 from .jit import kernel
-from .mixing import FEW, GRAIN_PRICE, LAYERS, Mixtures, combine
+from .mixing import FEW, LAYERS, Mixtures, combine, wax
+from .scene import Scene
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
@@ -34,8 +33,7 @@ class Plan:
 
 
 @kernel
-def _soften(cells, aim, ground, same, crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, dark_price,  # type: ignore[no-untyped-def]
-            sharp, level):  # fmt: skip
+def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp, level):  # type: ignore[no-untyped-def]
     """Level (layers, n) of each crayon for the cells (n,): 0 none, 1 the lightest pressure of the table, and so on.
 
     same: whether all cells have the ground of the first.
@@ -47,7 +45,7 @@ def _soften(cells, aim, ground, same, crayons, pressures, a, b, grain, dull, to_
     for i in range(cells.size):
         at = cells[i]
         if i == 0 or not same:
-            combine(ground[at], crayons, pressures, a, b, grain, dull, to_lms, to_lab, grain_price, colour, price)
+            combine(ground[at], crayons, pressures, wax, colour, price)
         least = np.float32(np.inf)
         for m in range(total):
             dl, da, db = colour[m, 0] - aim[at, 0], colour[m, 1] - aim[at, 1], colour[m, 2] - aim[at, 2]
@@ -82,7 +80,7 @@ def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict
     aim = guide.coarse.reshape(-1, 3)
     label = cv2.resize(scene.family, shape[::-1], interpolation=cv2.INTER_NEAREST_EXACT).ravel()
     full = np.arange(len(swatches.pressures) + 1)
-    dull = swatches.lightness()
+    table = wax(swatches)
     levels = np.zeros((len(swatches.names), label.size), np.float32)
     where = np.argsort(label, kind="stable")
     first = np.searchsorted(label[where], np.arange(len(plan.mixtures.layers) + 1))
@@ -95,9 +93,8 @@ def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict
             return
         cells = where[first[g] : first[g + 1]]
         level = np.empty((left.size, cells.size), np.float32)
-        _soften(cells, aim, ground, turn == 0, left, FEW if left.size >= (LAYERS if turn is not None else LAYERS - 1) else full, swatches.a, swatches.b,
-                swatches.grain, dull, TO_LMS, TO_LAB, np.float32(GRAIN_PRICE), np.float32(dark_price), SHARP,
-                level)  # fmt: skip
+        many = left.size >= (LAYERS if turn is not None else LAYERS - 1)
+        _soften(cells, aim, ground, turn == 0, left, FEW if many else full, table, np.float32(dark_price), SHARP, level)
         for k, own in zip(left[: None if turn is None else 1], level, strict=False):
             levels[k, cells] = own
 

@@ -16,6 +16,7 @@ from .jit import kernel
 Floats = NDArray[np.float32]
 Labels = NDArray[np.int32]
 WEIGHTS = np.array([0.7, 1, 1], np.float32)  # shading parts a surface less than a change of hue
+FAMILIAR = np.array([0.35, 1, 1], np.float32)  # light and dark of one hue are made of the same crayons
 CARE = 0.8  # how much dearer merging is in the most important places
 EDGE = 0.7  # weight of the step along the common border beside that between the means
 SUBJECT = 0.15  # OKLab units: what parts the one who is drawn from the ground
@@ -62,7 +63,7 @@ def families(label: Labels, lab: Floats, kind: Floats, least: float) -> NDArray[
 
     kind: (h, w) differs where colours must not be mixed, as skin and cloth; least: OKLab units between families.
     """
-    means, size = _means(label, np.dstack([lab * WEIGHTS, KIND * kind, np.zeros_like(kind)]))
+    means, size = _means(label, np.dstack([lab * FAMILIAR, KIND * kind, np.zeros_like(kind)]))
     everywhere = np.ones((size.size, size.size), np.float32) - np.eye(size.size, dtype=np.float32)
     root = np.arange(size.size)
     _merge(means, size, everywhere, np.zeros_like(everywhere), np.float32(FAMILY * label.size), np.float32(0),
@@ -173,10 +174,12 @@ def directions(tensor: Floats, label: Labels, care: Floats, tip: float, wrist_de
     """
     h, w = label.shape
     size, tip = (-(-w // COARSE), -(-h // COARSE)), tip / COARSE
-    tensor, care = (np.asarray(cv2.resize(m, size, interpolation=cv2.INTER_AREA)) for m in (tensor, care))
+    tensor, care = (
+        np.asarray(cv2.resize(m, size, interpolation=cv2.INTER_AREA), np.float32) for m in (tensor, care)
+    )
     parts = np.asarray(cv2.resize(label, size, interpolation=cv2.INTER_NEAREST_EXACT))
     field = np.zeros((*parts.shape, 2), np.float32)
-    hand = np.array([np.cos(2 * np.deg2rad(wrist_deg)), np.sin(2 * np.deg2rad(wrist_deg))])
+    hand = wrist * np.array([np.cos(2 * np.deg2rad(wrist_deg)), np.sin(2 * np.deg2rad(wrist_deg))], np.float32)
     typical = np.float32(np.median(tensor[..., 2]) + 1e-9)
     pad = int(2.5 * FOLLOW * tip)
     for k in np.flatnonzero(np.bincount(parts.ravel())):
@@ -184,7 +187,7 @@ def directions(tensor: Floats, label: Labels, care: Floats, tip: float, wrist_de
         x, y, wide, high = cv2.boundingRect(mine)
         box = slice(max(0, y - pad), y + high + pad), slice(max(0, x - pad), x + wide + pad)
         here = mine[box].astype(np.float32)
-        one = _direction(tensor[box], here, hand * wrist, typical, parts.size)
+        one = _direction(tensor[box], here, hand, typical, parts.size)
         spread = blur(np.dstack([tensor[box] * here[..., None], here]), FOLLOW * tip)
         firm = np.hypot(spread[..., 0], spread[..., 1])
         clear = firm / (spread[..., 2] + 0.5 * typical * spread[..., 3] + 1e-12)
@@ -198,7 +201,8 @@ def directions(tensor: Floats, label: Labels, care: Floats, tip: float, wrist_de
 
 def _direction(tensor: Floats, here: Floats, hand: Floats, typical: np.float32, sheet: int) -> Floats:
     """The one direction (2,), as a unit vector of the double angle, of the surface that `here` (h, w) marks."""
-    inner = cv2.erode(here, np.ones((3, 3), np.uint8))  # its border says less than what it holds
+    # Its border says less than what it holds.
+    inner = np.asarray(cv2.erode(here, np.ones((3, 3), np.uint8)), np.float32)
     inner = inner if inner.sum() > 0.3 * here.sum() else here
     total = (tensor * inner[..., None]).sum((0, 1))
     own = total[:2] / (total[2] + typical * inner.sum())

@@ -100,7 +100,7 @@ def gains(
     pressures = max(1, int((swatches.pressures <= coat.hardest).sum()))
     gain, best = np.full(need.shape, UNASKED, np.float32), np.zeros(need.shape, np.int8)
     weights = np.float32(coat.tone), np.float32(coat.dark_price), np.float32(GRAIN_PRICE)
-    table = (m[k, :pressures] for m in (swatches.a, swatches.b, swatches.grain))
+    table = (m[k, :pressures] for m in (swatches.a[1], swatches.b[1], swatches.grain))
     _gain(*corner, current, lab, need, *table, TO_LMS, TO_LAB, *weights, gain, best)
     return gain, best
 
@@ -146,7 +146,8 @@ def _worthiest(
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
     own = np.stack([(plan.mixtures.layers == k).any(1) for k in range(len(swatches.names))])
     body = (seen.skin, foreign(swatches, SKIN_RAD)), (seen.hair, foreign(swatches, HAIR_RAD))
-    asked = cv2.dilate(need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells)))
+    near = cv2.dilate(need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells)))
+    asked = np.asarray(near, np.uint8)
 
     def worth(k: int) -> Floats:
         gain, _ = gains(now, aim, (0, 0), asked, swatches, k, coat)

@@ -1,10 +1,25 @@
-"""Fixtures: a bench on which strokes are drawn with either physics."""
+"""Fixtures: a bench on which strokes are drawn with either physics. """
+
+import signal
 
 import pytest
 from bench_sheet import CRAYONS, Bench
 
 from crayonize.crayons.palette import Crayon, Palette
+from crayonize.machine import kernels
 from crayonize.wax import rub
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job is born deaf to it, and so its children
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """One flag stores the golden pictures anew, see pictures/golden.py."""
+    parser.addoption("--store-golden", action="store_true", help="store the golden pictures as they are now")
+
+
+def pytest_collection_finish() -> None:
+    """All modules with kernels have been imported: take these from the cache, by their source."""
+    kernels.keep_kernels()
 
 
 @pytest.fixture(scope="session")

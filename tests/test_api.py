@@ -191,10 +191,24 @@ def test_a_photo_that_cannot_be_read_is_refused():
 def test_memory_is_looked_at_before_the_photo_is_read(photo, tmp_path, monkeypatch):
     Image.fromarray(photo).save(tmp_path / "photo.png")
     monkeypatch.setattr(memory, "available_bytes", lambda: 2_000_000_000)
-    monkeypatch.setattr("crayonize.images.read.read_linear", lambda *_: pytest.fail("began to read"))
+    monkeypatch.setattr("crayonize.images.read.Photo.light", lambda *_: pytest.fail("began to read"))
     for image in (photo, Image.fromarray(photo), tmp_path / "photo.png"):
         with pytest.raises(ValueError, match=r"size: 20000 x \d+ cells need \d+\.\d GB of memory, 2\.0 GB are free"):
             crayonize.convert(image, size=20000)
+
+
+
+def test_a_preview_may_be_twice_as_large(monkeypatch):
+    """It has a quarter of the cells: what just fits as a preview does not fit whole."""
+    monkeypatch.setattr(memory, "available_bytes", lambda: memory.OVERHEAD + 1000**2 * memory.BYTES_PER_CELL)
+    api.check_size(2, 2, 2000, preview=True)
+    api.check_size(2, 2, 1000, preview=False)
+    with pytest.raises(ValueError, match="a size of 1414 would fit"):
+        api.check_size(2, 1, 2000, preview=False)
+    with pytest.raises(ValueError, match="2000 x 2000 cells"):
+        api.check_size(2, 2, 2000, preview=False)
+    with pytest.raises(ValueError, match="1000 x 1000 cells"):
+        api.check_size(2, 2, 2000, preview=True, filmed=True)
 
 
 STATUS = Path("/proc/self/status")

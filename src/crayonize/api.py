@@ -13,11 +13,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stroke_gen import checks
 from stroke_gen.checks import did_you_mean, quoted
 
 from . import __version__
-from .machine import folder as cache
-from .machine import memory
+from .machine import kernels, memory
 from .settings import Settings
 
 if TYPE_CHECKING:
@@ -29,11 +29,12 @@ if TYPE_CHECKING:
 
     from stroke_gen.drawing import Drawing
 
+    from .images.read import Photo, Source
     from .pipeline import Easel, Watch
 
-    Photo = str | os.PathLike[str] | Image | NDArray[Any]
 
 Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
+MAX_SEED = 2**63 - 1
 MAX_SIZE = 20_000  # pixels along the long side
 MAX_THREADS = 256
 PHOTO_SIDE = 2048  # pixels of the photo's long side that are read: three times what the planner looks at
@@ -42,7 +43,7 @@ _MM_PER_INCH = 25.4
 
 
 def convert(
-    image: Photo,
+    image: Source,
     out: str | os.PathLike[str] | None = None,
     *,
     strokes: str | os.PathLike[str] | None = None,
@@ -56,24 +57,44 @@ def convert(
 ) -> Image | NDArray[np.uint8] | Path:
     """Draw a photo with wax crayons.
 
-    image: a path, a Pillow image, or an array as `image_read.read_linear` takes it.
+    Parameters
+    ----------
+    image: a path, a Pillow image, or an array (h, w), (h, w, 3) or (h, w, 4) of uint8, uint16 or
+        sRGB-encoded floats 0..1.
     out: where to write the drawing (PNG, JPEG, WebP or TIFF), with settings and seed inside.
-    strokes: where to save the strokes (.json), from which `draw` makes the same picture at any size; .svg for
-        other programs.
-    timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4), `seconds` long; show_tip: with the
-        crayon in view.   legend: put the crayons used beside the picture.
-    light: shade the relief of paper and wax.   progress: called with a name and the share done, 0..1.
-    choices: any field of `Settings` (palette, paper, style, force, size, seed, threads, preview, focus, ...).
+    strokes: where to save the strokes: .json, from which `draw` makes the same picture at any
+        size, or .svg for other programs.
+    timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4).
+    seconds: length of the film, 3 to 600.
+    show_tip: with the crayon in the film.
+    legend: put the crayons used beside the picture.
+    light: shade the relief of paper and wax.
+    progress: called with the name of what is being done and the share done, 0..1.
+    **choices: any field of `Settings` (palette, paper, style, force, size, seed, ...).
 
-    Returns the same kind as `image`: an array gives uint8 sRGB (h, w, 3), a Pillow image a Pillow image, a
-    path the path `out`, or a Pillow image if there is no `out`. ValueError, one line, for what the caller
-    can mend; TypeError for an unknown choice; OSError if a file cannot be written.
+    Returns
+    -------
+    The same kind as `image`: for an array uint8 sRGB (h, w, 3), for a Pillow image one, for a path
+    the path `out`, or a Pillow image if there is no `out`.
+
+    Raises
+    ------
+    ValueError: one line, for what the caller can mend.
+    TypeError: for an unknown choice.
+    OSError: if a file cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> sky = np.full((40, 60, 3), (120, 170, 230), np.uint8)
+    >>> convert(sky, size=90, style="sketch", seed=1).shape
+    (60, 90, 3)
     """
     import numpy as np
     from PIL import Image
 
     settings = settings_of(choices)
-    check_outputs([image, *used_files(settings)], out, strokes, timelapse)
+    check_outputs([image, *settings.files()], out, strokes, timelapse)
     with filming(timelapse, seconds, show_tip, light) as watch:
         drawn = sketch(image, settings, progress, watch)
     picture = finish(*drawn, out, strokes, light=light, settings=settings, legend=legend)
@@ -94,9 +115,34 @@ def draw(
     light: bool = True,
     progress: Progress | None = None,
 ) -> NDArray[np.uint8]:
-    """The picture of a Drawing, or of a drawing's file: uint8 sRGB (h, w, 3), its long side `size` pixels.
+    """The picture of a Drawing, or of a drawing's file.
 
-    preview: without smearing and at half the size. The rest, and the errors, as in `convert`.
+    Parameters
+    ----------
+    drawing: a `stroke_gen.drawing.Drawing`, or the path of one as .json, or of lines as .svg.
+    size: long side of the picture in pixels, 1 to 20000.
+    out: where to write the picture as well.
+    threads: at most so many at once; they change nothing in the picture. None: all cores.
+    preview: without smearing and at half the size.
+    light, progress: as in `convert`.
+
+    Returns
+    -------
+    uint8 sRGB (h, w, 3).
+
+    Raises
+    ------
+    ValueError: one line, naming the stroke and the field that is wrong.
+    OSError: if `out` cannot be written.
+
+    Examples
+    --------
+    >>> from stroke_gen.drawing_file import drawing_from_json
+    >>> line = {"crayon": "red", "path": [[10, 10], [90, 50]]}
+    >>> drawing = drawing_from_json({"format": "crayonize drawing", "version": 1, "sheet_mm": [100, 60],
+    ...                              "paper": "smooth", "palette": "box8", "strokes": [line]})
+    >>> draw(drawing, size=200).shape
+    (120, 200, 3)
     """
     return finish(*redraw(drawing, size, threads, preview, progress, out=out), out, light=light)
 
@@ -111,29 +157,18 @@ def settings_of(choices: dict[str, Any]) -> Settings:
         if name not in known:
             raise TypeError(f"there is no choice {quoted(name)}{did_you_mean(name, known)}")
     settings = Settings(**choices)
-    _check_whole("size", settings.size, 1, MAX_SIZE)
-    _check_whole("seed", settings.seed, 0, 2**63 - 1)
+    checks.whole(settings.size, 1, MAX_SIZE, "size")
+    checks.whole(settings.seed, 0, MAX_SEED, "seed", "2^63 - 1")
     _check_threads(settings.threads)
     for box in settings.focus:
         if len(box) != 4 or not all(0 <= x <= 1 for x in box):
             raise ValueError(f"focus: {box!r} is not x, y, w, h as fractions of the picture, from 0 to 1")
-    return settings
-
-
-def _check_whole(name: str, value: Any, low: int, high: int) -> None:
-    if type(value) is not int or not low <= value <= high:
-        raise ValueError(f"{name}: {value!r} is not a whole number from {low} to {high}")
+    return settings.parsed()
 
 
 def _check_threads(threads: int | None) -> None:
     if threads is not None:
-        _check_whole("threads", threads, 1, MAX_THREADS)
-
-
-def used_files(settings: Settings) -> list[str]:
-    """Palette, style and paper, where they are given as files."""
-    given = (settings.palette, settings.style, settings.paper)
-    return [source for source in given if isinstance(source, str) and Path(source).is_file()]
+        checks.whole(threads, 1, MAX_THREADS, "threads")
 
 
 def check_outputs(
@@ -176,23 +211,24 @@ def filming(
     if path is None:
         return nullcontext()
     workshop()
-    from .film import plan as timelapse
+    from .film.plan import Timelapse
 
-    cache.keep_kernels()
-    return timelapse.Timelapse(path, seconds, show_tip, light)
+    kernels.keep_kernels()
+    return Timelapse(path, seconds, show_tip, light)
 
 
 def sketch(
-    image: Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
+    image: Source | Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
-    from .images.read import measured, read_linear
-    from .wax import paper
+    from .images.read import open_photo
+    from .wax.paper import colour_linear
 
-    width, height, reading = measured(image)
-    check_size(width, height, settings.size, settings.preview, photo=reading, filmed=watch is not None)
-    ground = paper.colour_linear(paper.load_paper(settings.paper).colour)
-    drawn: tuple[Drawing, Easel] = workshop().sketch(read_linear(image, PHOTO_SIDE, ground), settings, progress, watch)
+    with open_photo(image) as photo:
+        check_size(photo.width, photo.height, settings.size, settings.preview, photo=photo.decoding,
+                   filmed=watch is not None)  # fmt: skip
+        light = photo.light(PHOTO_SIDE, colour_linear(settings.ground.colour))
+    drawn: tuple[Drawing, Easel] = workshop().sketch(light, settings, progress, watch)
     return drawn
 
 
@@ -209,7 +245,7 @@ def redraw(
     """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the sheet."""
     from stroke_gen.drawing import Drawing, check_drawing
 
-    _check_whole("size", size, 1, MAX_SIZE)
+    checks.whole(size, 1, MAX_SIZE, "size")
     _check_threads(threads)
     check_outputs([drawing], out)
     if isinstance(drawing, Drawing):
@@ -293,7 +329,7 @@ def finish(
         if Path(strokes).suffix.lower() == ".svg":
             from .svg.save import save_svg
 
-            save_svg(drawing, strokes)
+            save_svg(drawing, strokes, easel.box.palette)
         else:
             save_drawing(drawing, strokes)
     return picture
@@ -320,10 +356,9 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 def workshop() -> ModuleType:
     """The pipeline with all its kernels, these from the compile cache."""
     memory.share_heaps()
-    cache.before_kernels()
     from . import pipeline
 
-    cache.keep_kernels()
+    kernels.keep_kernels()
     return pipeline
 
 

@@ -1,21 +1,21 @@
 """The two conductors: a photo becomes a Drawing, a Drawing becomes a picture."""
 
-import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stroke_gen import params, subject
+from stroke_gen import generate as generator
+from stroke_gen import subject
 from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
-from stroke_gen.generate import generate, stages as count_stages
 
 from .crayons import calibration
 from .crayons.palette import Palette, load_palette
 from .light import optics
+from .machine import cores
 from .settings import Settings
 from .wax import paper, rub
 from .wax.sheet import Sheet
@@ -70,16 +70,26 @@ class Easel:
         return optics.render_reduced(self.sheet, self.ground, shape, threads=self.threads)
 
 
-def easel(drawing: Drawing, size: int, threads: int | None = None, smears: bool = True) -> Easel:
-    """A blank sheet for a drawing, `size` cells along its long side."""
-    palette = load_palette(drawing.palette)
-    sheet_paper = paper.load_paper(drawing.paper)
+def easel(
+    drawing: Drawing,
+    size: int,
+    threads: int | None = None,
+    smears: bool = True,
+    palette: Palette | None = None,
+    ground: paper.Paper | None = None,
+) -> Easel:
+    """A blank sheet for a drawing, `size` cells along its long side.
+
+    palette, ground: palette and paper of the drawing, where they have been read already.
+    """
+    palette = palette or load_palette(drawing.palette)
+    sheet_paper = ground or paper.load_paper(drawing.paper)
     cell_mm = max(drawing.width_mm, drawing.height_mm) / size
     rows, cols = max(1, round(drawing.height_mm / cell_mm)), max(1, round(drawing.width_mm / cell_mm))
     tooth = paper.tooth(sheet_paper, rows, cols, cell_mm, drawing.seed)
     sheet = Sheet(tooth, cell_mm, *_optics(palette))
     box = rub.Box(palette, rub.physics(drawing.physics), cell_mm, drawing.seed)
-    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or os.cpu_count() or 1, smears)
+    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or cores.allowed(), smears)
 
 
 def _optics(palette: Palette) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -108,14 +118,6 @@ def draw(
     return stand
 
 
-def _style(settings: Settings) -> params.Style:
-    """The style as this hand has it."""
-    style = params.with_force(params.load_style(settings.style), settings.force)
-    if settings.age is not None:
-        style = params.with_age(style, settings.age)
-    return replace(style, wrist_deg=-style.wrist_deg) if settings.left_handed else style
-
-
 def sketch(
     photo: NDArray[np.float32], settings: Settings, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Drawing, Easel]:
@@ -125,13 +127,13 @@ def sketch(
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
     who = subject.see(photo, work_shape(width_mm, height_mm))
     photo = fit(photo, work_shape(width_mm, height_mm))  # all that is looked at; the large one may go
-    style = _style(settings)
+    style = settings.hand
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
     stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
-                  smears=not settings.preview)  # fmt: skip
+                  not settings.preview, settings.box, settings.ground)  # fmt: skip
     stand.show_to(watch)
-    table = calibration.swatches(stand.box.palette, paper.load_paper(settings.paper), settings.physics, stand.threads)
-    stages = count_stages(style)
+    table = calibration.swatches(settings.box, settings.ground, settings.physics, stand.threads)
+    stages = generator.stages(style)
     done = 0
 
     def draw(strokes: list[Stroke]) -> None:
@@ -141,8 +143,10 @@ def sketch(
             stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
         done += 1
 
-    strokes = generate(photo, who, width_mm, height_mm, table, style, settings.seed, draw=draw, look=stand.seen,
-                       threads=stand.threads, focus=settings.focus)  # fmt: skip
+    strokes = generator.generate(
+        photo, who, width_mm, height_mm, table, style, settings.seed,
+        draw=draw, look=stand.seen, threads=stand.threads, focus=settings.focus,
+    )  # fmt: skip
     drawing = Drawing(
         width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed
     )

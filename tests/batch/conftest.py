@@ -18,6 +18,7 @@ import pytest
 from PIL import Image
 
 HERE = Path(__file__).parent
+HANGS = 300.0  # s after which something is taken to hang for ever: no test says how long anything takes
 ROOT = HERE.parent.parent
 _CALM: dict[
     tuple[tuple[str, str], ...], dict[str, str]
@@ -59,7 +60,7 @@ class Batch:
         self.lines: list[dict[str, Any]] = []
         self.said = ""
 
-    def end(self, limit: float = 60) -> int:
+    def end(self, limit: float = HANGS) -> int:
         """Wait for the end; the exit code."""
         out, err = self.process.communicate(timeout=limit)
         self.lines = [json.loads(line) for line in (out or b"").decode("utf-8").splitlines()]
@@ -81,11 +82,12 @@ class Batch:
         """The workers alive now."""
         return self.session()
 
-    def wait_until(self, happened: Callable[[], object], limit: float = 20) -> None:
-        """Wait for a state that is then to be disturbed."""
-        end = time.monotonic() + limit
+    def wait_until(self, happened: Callable[[], object], ended: bool = False) -> None:
+        """Wait for a state; ended: of a run that is over, else it must go on until then."""
+        end = time.monotonic() + HANGS
         while not happened():
-            assert time.monotonic() < end and self.process.poll() is None, "that never happened"
+            assert time.monotonic() < end, "that never happened"
+            assert ended or self.process.poll() is None, "the run is over"
             time.sleep(0.002)
 
     def begun(self, pictures: int = 1) -> Callable[[], bool]:

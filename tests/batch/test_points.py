@@ -57,7 +57,7 @@ class Forge:
                 break
         self._say("go")
         code = int(self._process.stdout.readline())
-        strace.communicate(timeout=10)
+        strace.communicate(timeout=300)
         return code, self._errors.read_text().strip("\0\n"), trace.read_text()
 
     def _say(self, line: str) -> None:

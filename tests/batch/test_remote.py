@@ -10,8 +10,10 @@ import pytest
 from conftest import HERE, ROOT, Batch, photo, tree
 from s3_server import Store
 
-from crayonize.batch import Options, Recipe, remote, run
-from crayonize.batch.job import Found
+from crayonize.batch import remote
+from crayonize.batch.conductor import run
+from crayonize.batch.job import Found, Recipe
+from crayonize.batch.options import Options
 from crayonize.settings import Settings
 
 fsspec = pytest.importorskip("fsspec")
@@ -21,7 +23,7 @@ def start(source: object, target: object, *words: str, **env: str) -> Batch:
     """Run a batch between URLs to its end."""
     path = os.pathsep.join(map(str, (ROOT / "src", ROOT, HERE)))
     batch = Batch([source], target, ["-j", "2", *words], [], env={**os.environ, "PYTHONPATH": path, **env})  # type: ignore[list-item,arg-type]
-    batch.end(120)
+    batch.end()
     return batch
 
 

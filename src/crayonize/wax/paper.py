@@ -6,7 +6,6 @@ patch is made by convolution in the frequency domain and laid side by side over 
 
 import functools
 import os
-import re
 import tomllib
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
@@ -17,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.checks import did_you_mean
+
+from ..images.srgb import light_of
 
 Floats = NDArray[np.float32]
 
@@ -88,12 +89,10 @@ def _checked(paper: Paper) -> Paper:
 
 def colour_linear(colour: str) -> tuple[float, float, float]:
     """Linear RGB of '#rrggbb'."""
-    if not re.fullmatch("#?[0-9a-fA-F]{6}", colour):
-        raise ValueError(f"colour: {colour!r} is not #rrggbb")
-    digits = colour.removeprefix("#")
-    code = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in code)
-    return r, g, b
+    try:
+        return light_of(colour)
+    except ValueError as error:
+        raise ValueError(f"colour: {error}") from error
 
 
 def tooth(paper: Paper, rows: int, cols: int, cell_mm: float, seed: int) -> Floats:
