@@ -226,7 +226,13 @@ class _Sitter:
 
         dark = f32([0.2, 0, 0])
         if radius > 1.6 * width:
-            turn(0.95, 0.35, 0.7, float(np.interp(colour[0], [0.3, 0.6], [0.85, 0.55])), colour)
+            bright = float(np.interp(colour[0], [0.3, 0.6], [0, 1]))
+            base = f32([max(0.45, colour[0]), *colour[1:]])
+            turn(0.95, 0.35, 0.7, 0.8 - 0.2 * bright, base)
+            if colour[1] < 0:  # grey, with a breath of blue or green
+                turn(0.85, 0.4, 1.2, 0.35, base * f32([1, 5, 5]))
+            else:
+                turn(0.95, 0.35, 0.9, 0.6 * (1 - bright), dark)
             turn(1.0, 0.95, 1.0, 0.65, colour * f32([0.6, 1, 1]))
             turn(0.45, 0, 0.5, 1.0, dark)
         else:
@@ -260,7 +266,11 @@ class _Sitter:
         length = float(np.linalg.norm(middle[0] - middle[-1]))
         up = unit(top.mean(0) - bottom.mean(0)) * np.linalg.norm(top[2] - bottom[2])
         low, high = curve(bottom - 0.3 * up, 0.3), curve(top + 0.25 * up, 0.3)
-        dark = subject.soft(self.light, 0.5 * self.eye) - self.light_near
+        lid = np.concatenate([bottom, self.face.path(subject.UPPER_LID[side])])
+        bare = self.light[subject.polygons([lid], self.light.shape) > 0.5]
+        if not len(bare):
+            return
+        dark = np.quantile(bare, 0.7) - self.light_near  # than the skin between brow and eye
         band = subject.polygons([np.concatenate([low, high[::-1]])], dark.shape) > 0.5
         if not band.any():
             return
@@ -306,7 +316,7 @@ class _Sitter:
 
         def pressed(path: Floats) -> Floats:
             off = np.linalg.norm(sampled(self.near, path) - self.skin, axis=1)
-            return f32(np.clip(0.12 + 2.4 * off, 0, 0.85))
+            return f32(np.clip(0.22 + 2.2 * off, 0, 0.85))
 
         for top, bottom in bands:
             self.loft(top, bottom, "lips", width, pressed, colour)
@@ -349,7 +359,7 @@ class _Sitter:
             light = sampled(self.light_near, path)
             return f32(np.clip(shown + 1.2 * (teeth - light - 0.03), 0, 0.6) * (cavity(path) < 0.2))
 
-        self.loft(top, bottom, "white", 0.9 * self.fine, shade, f32([0.72, 0.01, 0.05]), 0.5)
+        self.loft(top, bottom, "white", 0.9 * self.fine, shade, f32([0.82, 0.0, 0.04]), 0.5)
         self.loft(top, bottom, "mouth", 0.9 * self.fine, cavity, f32([0.28, 0.08, 0.04]))
 
     def contours(self) -> None:
@@ -426,6 +436,7 @@ def _rosy(seen: Floats, skin: Floats) -> Floats:
     light, a, b = np.median(seen[chroma >= np.median(chroma)], 0)
     hue = np.clip(np.arctan2(b, a), np.deg2rad(12), np.deg2rad(36))
     chroma = 1.15 * np.hypot(a, b) * np.clip(0.12 / np.hypot(*skin[1:]), 1, 1.6)
+    chroma = max(float(chroma), 0.35 * float(light))
     return f32([light, chroma * np.cos(hue), chroma * np.sin(hue)])
 
 

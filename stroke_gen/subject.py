@@ -189,7 +189,9 @@ def _along_edges(level: Floats, lab: Floats, radius: float) -> Floats:
     """A map that ends where the picture has edges: guided filter, radius in long sides."""
     small = _sized(level, (lab.shape[0], lab.shape[1]))
     cells = max(2, round(radius * max(small.shape)))
-    return np.clip(cv2.ximgproc.guidedFilter(lab, small, cells, EDGE), 0, 1)
+    # OpenCV takes the covariance of a guide in 0..1 for singular, and then ignores its edges
+    smooth = cv2.ximgproc.guidedFilter(255 * lab, small, cells, 255**2 * EDGE)
+    return np.clip(smooth, 0, 1)
 
 
 def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
@@ -224,7 +226,8 @@ def _fall(radius: Floats) -> Floats:
 def skin(subject: Subject, lab: Floats) -> Floats:
     """Where skin is (h, w).
 
-    Faces without eyes, brows, mouth, hair, glasses and paint, and what of the body looks alike.
+    Faces without hair, glasses and paint, and what of the body looks alike. Eyes, brows and mouth count
+    as skin: that is what they are drawn on.
     """
     shape = lab.shape[0], lab.shape[1]
     out = np.zeros(shape, np.float32)
@@ -233,7 +236,7 @@ def skin(subject: Subject, lab: Floats) -> Floats:
         sample = lab[_oval(face, shape, 0.8) * (1 - own) > 0.7]
         like = _alike(lab, sample if len(sample) > MANY else lab[oval > 0.5])
         body = like * like * subject.mask * np.clip(2 - _far(face, shape) / (3 * face.height), 0, 1)
-        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like, 1), body) * (1 - own))
+        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like + own, 1), body))
     return soft(out)
 
 
@@ -252,7 +255,7 @@ def hair(subject: Subject, lab: Floats, bare: Floats) -> Floats:
         forehead = _along(face, shape) < (face.path((33, 263)) @ face.down).mean()
         sample = lab[(_oval(face, shape, 1.3) - _oval(face, shape)) * free * forehead > 0.5]
         if len(sample) > MANY:
-            out = np.maximum(out, head * free * _alike(soft(lab, 0.02 * face.height), sample) ** 2)
+            out = np.maximum(out, head * free * _alike(lab, sample) ** 2)
     return soft(out)
 
 
