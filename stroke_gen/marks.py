@@ -19,6 +19,7 @@ Floats = NDArray[Any]
 STEP = 0.6  # cells between points of a path
 FINEST_MM = 0.5  # width of the sharpest tip
 FIRM = (0.5, 0.7, 1.4, 2.0), (1.5, 1.1, 1.0, 0.8)  # widths in mm; N/mm2 for full darkness on wax
+DEPTH = 1.6  # power of a mark's darkness to which the pressure rises
 WOBBLE = 0.06  # widths
 AREAS = "lips", "white"  # drawn at the pressure that gives their colour
 FREE = "iris", "pupil", "frame", "symbol"  # in any crayon; other lines in those of skin
@@ -144,7 +145,7 @@ def strokes(
         k, share = _crayon(mark, table)
         width = max(FINEST_MM, mark.width * cell_mm)
         # a fine tip has to be pressed harder to leave a mark on wax; darkness goes with the root
-        firm = np.interp(width, *FIRM) * (share * mark.pressure) ** 2
+        firm = np.interp(width, *FIRM) * (share * mark.pressure) ** DEPTH
         wobble = np.cumsum(rng.standard_normal(mark.path.shape), 0) / np.sqrt(len(mark.path))
         path = np.round((mark.path + WOBBLE * mark.width * wobble) * cell_mm, 3).astype(np.float32)
         force = np.clip(np.round(firm * 0.785 * width**2, 3), 0.02, 60).astype(np.float32)

@@ -21,7 +21,11 @@ from .subject import Face, Subject
 from .swatches import Swatches
 from .symbols import symbols
 
-FULL, SMALL = 9.0, 6.0  # eye widths in cells: all features; lid, dab and mouth line; below, blots
+LARGE, FULL, SMALL = (
+    18.0,
+    9.0,
+    6.0,
+)  # eye widths in cells: lashes, teeth; all features; lids and mouth
 STRONG = 0.14  # darkness of a face's features against what lies round them
 RIDGE = 0.045  # darkness of a line that landmarks do not explain
 LEAST = 0.1  # pressure below which the hand lifts the crayon
@@ -199,11 +203,11 @@ class _Sitter:
         up = unit(top[1:-1].mean(0) - bottom[1:-1].mean(0))
         outer = top[0] + 0.1 * (top[0] - top[-1])
         lid = np.concatenate([[outer], top[:-1]]) if self.eye >= FULL else top
-        made = self.line(lid, "lid", 0.06, 0.55, 2.2, 1.15, (0.3, 0.3))
-        if self.eye >= 18:  # lashes make it the heaviest line of a face
+        made = self.line(lid, "lid", 0.06, 0.75, 2.2, 1.15, (0.3, 0.3))
+        if self.eye >= LARGE:  # lashes make it the heaviest line of a face
             weight = np.interp(np.linspace(0, 1, len(made)), [0, 0.35, 0.8, 1], [0.4, 1, 0.7, 0])
             shade = f32([0.22, *(0.4 * self.skin[1:])])
-            weight *= np.interp(self.eye, [18, 40], [0.5, 0.9])
+            weight *= np.interp(self.eye, [LARGE, 40], [0.6, 0.9])
             self.add(made + 0.03 * self.eye * up, weight, shade, self.fine, "lid")
         if self.eye >= FULL:
             self.line(bottom[1:-1], "lower lid", 0.07, 0.0, 3.2, 0.8, (0.2, 0.4))
@@ -289,13 +293,13 @@ class _Sitter:
         t = np.linspace(0, 1, max(5, int(0.25 * length / STEP)), dtype=np.float32)[:, None, None]
         hairs = ((1 - t) ** 2 * root + 2 * t * (1 - t) * bend + t * t * tip).astype(np.float32)
         found = sampled(dark, hairs.reshape(-1, 2)).reshape(len(t), number)
-        level = min(1.0, 0.35 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
+        level = min(1.0, 0.45 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
         pressure = level * taper(len(t), 0.2, 0.7)[:, None]
         for i in np.argsort(u):
             self.add(hairs[:, i], pressure[:, i], colour, width, "brow")
 
     def nose(self) -> None:
-        self.line(self.face.path(NOSE), "nose", 0.09, 0.0, 4.5, 0.95, (0.1, 0.1), 1.2)
+        self.line(self.face.path(NOSE), "nose", 0.09, 0.05, 5.5, 1.0, (0.1, 0.1), 1.2)
         for side in BRIDGE:
             self.line(self.face.path(side), "bridge", 0.12, -0.1, 4, 1.1, (0.5, 0.4), 1.2)
         for fold in CHEEK:
@@ -360,7 +364,23 @@ class _Sitter:
             return f32(np.clip(shown + 1.2 * (teeth - light - 0.03), 0, 0.6) * (cavity(path) < 0.2))
 
         self.loft(top, bottom, "white", 0.9 * self.fine, shade, f32([0.82, 0.0, 0.04]), 0.5)
+        if self.eye >= LARGE:
+            self.gaps(top, bottom, teeth)
         self.loft(top, bottom, "mouth", 0.9 * self.fine, cavity, f32([0.28, 0.08, 0.04]))
+
+    def gaps(self, top: Floats, bottom: Floats, teeth: float) -> None:
+        """Where one tooth ends and the next begins, if the photo shows it."""
+        upper, lower = curve(top), curve(bottom)
+        at = np.arange(len(upper)) * (len(lower) - 1) // (len(upper) - 1)
+        light = sampled(self.light_near, 0.6 * upper + 0.4 * lower[at])
+        dip = smooth(light, round(0.25 * self.eye / STEP)) - light
+        apart = max(2, round(0.07 * self.eye / STEP))
+        for i in range(apart, len(dip) - apart):
+            around = dip[i - apart : i + apart + 1]
+            if dip[i] == around.max() and dip[i] > 0.012 and light[i] > teeth - 0.2:
+                path = curve(np.stack([upper[i], 0.25 * upper[i] + 0.75 * lower[at[i]]]))
+                pressure = min(0.4, 0.15 + 6 * float(dip[i])) * taper(len(path), 0.1, 0.6)
+                self.add(path, pressure, f32([0.6, 0, 0.02]), 0.6 * self.fine, "white")
 
     def contours(self) -> None:
         """Cheek and jaw, where the photo has an edge."""
@@ -436,7 +456,7 @@ def _rosy(seen: Floats, skin: Floats) -> Floats:
     light, a, b = np.median(seen[chroma >= np.median(chroma)], 0)
     hue = np.clip(np.arctan2(b, a), np.deg2rad(12), np.deg2rad(36))
     chroma = 1.15 * np.hypot(a, b) * np.clip(0.12 / np.hypot(*skin[1:]), 1, 1.6)
-    chroma = max(float(chroma), 0.35 * float(light))
+    chroma = np.maximum(chroma, 0.35 * light)
     return f32([light, chroma * np.cos(hue), chroma * np.sin(hue)])
 
 

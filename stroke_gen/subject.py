@@ -226,8 +226,8 @@ def _fall(radius: Floats) -> Floats:
 def skin(subject: Subject, lab: Floats) -> Floats:
     """Where skin is (h, w).
 
-    Faces without hair, glasses and paint, and what of the body looks alike. Eyes, brows and mouth count
-    as skin: that is what they are drawn on.
+    Faces without hair, glasses and paint, and what of the body looks alike. Eyes, brows and mouth
+    count as skin: that is what they are drawn on.
     """
     shape = lab.shape[0], lab.shape[1]
     out = np.zeros(shape, np.float32)

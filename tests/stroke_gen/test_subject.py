@@ -1,4 +1,4 @@
-"""Who is drawn: faces found in a photo and nowhere else, the subject's mask, skin, hair and care."""
+"""Who is drawn: faces found where they are and nowhere else, the mask, skin, hair and care."""
 
 import hashlib
 from pathlib import Path
