@@ -16,7 +16,7 @@ from stroke_gen.drawing import Drawing, Stroke
 from stroke_gen.files import check_target, whole_file
 
 from .. import pipeline
-from ..crayons.palette import load_palette
+from ..crayons.palette_files import load_palette
 from ..crayons.used import by_crayon
 from ..images.icc import encode_srgb
 from ..images.write import write_image
