@@ -13,7 +13,8 @@ from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
 
 from .crayons import calibration
-from .crayons.palette import Palette, load_palette
+from .crayons.palette import Palette
+from .crayons.palette_files import load_palette
 from .light import optics
 from .machine import cores
 from .settings import Settings

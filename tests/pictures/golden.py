@@ -1,8 +1,10 @@
 """Pictures kept in tests/golden, and how a new one is compared with them.
 
-Another processor or another OpenCV may draw a stroke a little differently, so pictures are compared as they look
-from afar, square by square: mean colour, and how strong the grain is. `pytest --store-golden` stores them anew; look
-at them before committing. A failure leaves NAME-actual, NAME-expected and NAME-difference in tests/golden/failed.
+Another processor or another OpenCV may draw a stroke a little differently, so pictures are compared
+as they look
+from afar, square by square: mean colour, and how strong the grain is. `pytest --store-golden`
+stores them anew; look at them before committing. A failure leaves NAME-actual, NAME-expected and
+NAME-difference in tests/golden/failed.
 """
 
 from pathlib import Path
@@ -14,7 +16,8 @@ from PIL import Image
 GOLDEN = Path(__file__).parents[1] / "golden"
 FAILED = GOLDEN / "failed"
 SQUARE = 12  # pixels
-MEAN, WORST, GRAIN = 1.5, 14.0, 1.5  # sRGB levels: of all squares, of the worst one, of the grain of all
+# sRGB levels: of all squares, of the worst one, of the grain of all
+MEAN, WORST, GRAIN = 1.5, 14.0, 1.5
 
 Picture = NDArray[np.uint8]
 

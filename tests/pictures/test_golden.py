@@ -61,7 +61,9 @@ def test_golden(name: str, request: pytest.FixtureRequest) -> None:
 
 
 def test_the_comparison_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Darker, coarser, one square wrong, another size: each is noticed, and shown; noise of a bit is not."""
+    """Darker, coarser, one square wrong, another size: each is noticed, and shown; noise of a bit
+    is not.
+    """
     monkeypatch.setattr(golden, "GOLDEN", tmp_path)
     monkeypatch.setattr(golden, "FAILED", tmp_path / "failed")
     rng = np.random.default_rng(1)
@@ -71,7 +73,12 @@ def test_the_comparison_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     smooth = (picture * 0.95 + picture.mean((0, 1)) * 0.05).astype(np.uint8)
     hole = picture.copy()
     hole[12:24, 24:36] = 255
-    wrong = {"in the mean": picture - 3, "grain": smooth, "row 12, column 24": hole, "was": picture[:-1]}
+    wrong = {
+        "in the mean": picture - 3,
+        "grain": smooth,
+        "row 12, column 24": hole,
+        "was": picture[:-1],
+    }
     for words, other in wrong.items():
         with pytest.raises(AssertionError, match=words):
             golden.compare("one", other, store=False)
