@@ -95,7 +95,7 @@ def _disc(points: Floats, level: Floats, opening: Floats, wide: float) -> tuple[
     centres = middle + shares * (inner - outer) + lifts * wide * across
     far = np.linalg.norm(points - centres[:, None], axis=2) / wide
     best = (-np.inf, middle, 0.2)
-    for radius in (0.18, 0.2, 0.22):
+    for radius in (0.18, 0.2, 0.22, 0.24):
         disc, ring = far < radius, (far > 1.1 * radius) & (far < 1.6 * radius)
         means = [(part @ level) / np.maximum(part.sum(1), 1) for part in (ring, disc)]
         worth = means[0] - means[1] - (0.4 * shares**2 + 2 * lifts**2)[:, 0]

@@ -231,12 +231,12 @@ class _Sitter:
         dark = f32([0.2, 0, 0])
         if radius > 1.6 * width:
             bright = float(np.interp(colour[0], [0.3, 0.6], [0, 1]))
-            base = f32([max(0.45, colour[0]), *colour[1:]])
-            turn(0.95, 0.35, 0.7, 0.8 - 0.2 * bright, base)
+            base = f32([max(0.4, colour[0]), *colour[1:]])
+            turn(0.95, 0.35, 0.5, 0.85 - 0.25 * bright, base)
             if colour[1] < 0:  # grey, with a breath of blue or green
                 turn(0.85, 0.4, 1.2, 0.35, base * f32([1, 5, 5]))
             else:
-                turn(0.95, 0.35, 0.9, 0.6 * (1 - bright), dark)
+                turn(0.95, 0.35, 0.6, 0.85 * (1 - bright), dark)
             turn(1.0, 0.95, 1.0, 0.65, colour * f32([0.6, 1, 1]))
             turn(0.45, 0, 0.5, 1.0, dark)
         else:
@@ -419,10 +419,10 @@ class _Sitter:
             top, bottom = (
                 self.face.path(lid[side]) for lid in (subject.UPPER_LID, subject.LOWER_LID)
             )
-            if np.linalg.norm(top[0] - top[-1]) > 0.35 * self.eye:
-                self.line(0.5 * (top + bottom), "lid", 0.3, 0.8, 2, 1.0, (0.1, 0.1), colour=dark)
+            if np.linalg.norm(top[0] - top[-1]) > AWAY * self.eye:
+                self.line(0.5 * (top + bottom), "lid", 0.3, 0.9, 2, 1.6, (0.1, 0.1), colour=dark)
         lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
-        self.line(lips, "mouth", 0.15, 0.3, 2, 1.0, (0.1, 0.1), 1.3)
+        self.line(lips, "mouth", 0.15, 0.6, 2, 1.4, (0.1, 0.1), colour=dark)
 
 
 def _chains(thin: NDArray[np.uint8]) -> list[Floats]:
