@@ -78,7 +78,7 @@ class Easel:
         return optics.render_srgb(self.sheet, self.ground, light=light, threads=self.threads)
 
     def seen(self, shape: tuple[int, int]) -> NDArray[np.float32]:
-        """The sheet as linear RGB on a grid of `shape`, without light: what the generator looks at."""
+        """The sheet as linear RGB on a grid of `shape`, without light: what the generator sees."""
         if shape[0] > self.sheet.rows or shape[1] > self.sheet.cols:
             return fit(self.picture(light=False), shape)
         return optics.render_reduced(self.sheet, self.ground, shape, threads=self.threads)
@@ -123,7 +123,6 @@ def draw(
     *,
     threads: int | None = None,
     preview: bool = False,
-    light: bool = True,
     progress: Progress | None = None,
     watch: Onlooker | None = None,
 ) -> Easel:
@@ -143,7 +142,7 @@ def sketch(
     progress: Progress | None = None,
     watch: Onlooker | None = None,
 ) -> tuple[Drawing, Easel]:
-    """Plan and draw a photo in linear light (h, w, 3): its Drawing and the sheet it was drawn on."""
+    """Plan and draw a photo in linear light (h, w, 3): its Drawing, and the sheet drawn on."""
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
