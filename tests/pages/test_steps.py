@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from crayonize import cli
-from crayonize.crayons.palette import load_palette
+from crayonize.crayons.palette_files import load_palette
 from crayonize.pages import layout
 from crayonize.pages.outline import outline_of
 from crayonize.pages.steps import save_steps, steps_of

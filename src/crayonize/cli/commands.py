@@ -197,7 +197,7 @@ def _palettes(words: Sequence[str]) -> int:
     Parser(prog="crayonize palettes", description="List the boxes of crayons, for --palette.").read(
         words
     )
-    from ..crayons.palette import palette_names
+    from ..crayons.palette_files import palette_names
 
     return _list((name, f"{number:3} crayons  {title}") for name, title, number in palette_names())
 

@@ -7,7 +7,7 @@ once; those that give little come together at the end.
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +16,11 @@ from stroke_gen.drawing import Drawing, Stroke
 from stroke_gen.files import check_target, whole_file
 
 from .. import pipeline
-from ..crayons.palette import load_palette
+from ..crayons.palette_files import load_palette
 from ..crayons.used import by_crayon
 from ..images.icc import encode_srgb
 from ..images.write import write_image
+from ..pipeline import Progress
 from . import layout, legend
 from .layout import Layout, Step
 from .legend import Picture
@@ -30,7 +31,6 @@ FEW = 0.01  # of all wax: crayons that give less come together at the end
 # film at which the wax hides about two thirds of the pale drawing below it on a page
 SOLID_UM = 3.0
 
-Progress = Callable[[str, float], None]
 
 
 def save_steps(
