@@ -234,8 +234,9 @@ def foreign(swatches: Swatches, width_rad: float) -> Floats:
     warm = (hue[:, 1] * np.cos(WARM) + hue[:, 2] * np.sin(WARM)) / (chroma + 1e-6)
     off = np.clip((np.arccos(np.clip(warm, -1, 1)) - width_rad) / 0.5, 0, 1)
     grey = np.clip(1 - chroma / 0.05, 0, 1)
-    light = np.clip((hue[:, 0] - 0.85) / 0.1, 0, 1)  # white is at home everywhere
-    return np.maximum(off * (1 - grey), grey * (1 - light)).astype(np.float32)
+    light = np.clip((hue[:, 0] - 0.85) / 0.1, 0, 1)  # white is at home everywhere, and so is
+    dark = np.clip((0.48 - hue[:, 0]) / 0.08, 0, 1) * np.clip(2 - chroma / 0.06, 0, 1)  # what is as good as black
+    return (np.maximum(off * (1 - grey), grey * (1 - light)) * (1 - dark)).astype(np.float32)
 
 
 def clash(one: Floats, other: Floats) -> Floats:
