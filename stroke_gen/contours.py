@@ -89,7 +89,7 @@ def _edges(scene: Scene, lightness: Floats, width: float) -> Lines:
     settings = cv2.ximgproc_EdgeDrawing_Params()  # type: ignore[attr-defined]
     settings.GradientThresholdValue = 14
     settings.AnchorThresholdValue = 0  # a clean step's gradient is as high on two pixels, none of which would stand out
-    settings.MinPathLength = max(8, int(3 * width * SCALE))
+    settings.MinPathLength = max(8, int(6 * width * SCALE))
     detector.setParams(settings)
     detector.detectEdges(grey)
     chains: list[NDArray[Any]] = []
@@ -129,7 +129,7 @@ def _together(one: Lines, other: Lines) -> Lines:
 
 def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: float = 1.0) -> Lines:
     """Those faired chains that are long and strong enough to be lines, with their contrast and worth."""
-    fair = fair.only(np.flatnonzero(np.diff(fair.first) >= max(3.0, 2.5 * width)))
+    fair = fair.only(np.flatnonzero(np.diff(fair.first) >= max(3.0, 5 * width)))
     aside = np.float32(0.6 * width) * _normals(fair)
     contrast = np.abs(_sample(lightness, fair.points + aside) - _sample(lightness, fair.points - aside))
     mean = _means(contrast, fair.first)
@@ -137,7 +137,7 @@ def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: f
     care = _means(_sample(scene.care, fair.points), fair.first)
     rim = _means(np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)), fair.first)
     worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
-    return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.05))
+    return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.08))
 
 
 def _end_to_end(chains: Sequence[NDArray[Any]]) -> tuple[Floats, NDArray[np.int64]]:

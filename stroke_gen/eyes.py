@@ -9,6 +9,7 @@ from .marks import Floats, f32, sampled, unit
 from .subject import Face
 
 AWAY = 0.35  # of the other eye's width: narrower, an eye is turned away
+BROWN = 0.9  # hue of brown irises, which differ in lightness
 CLOSED = 0.12  # of its width: an eye that is less open is closed
 
 
@@ -76,14 +77,11 @@ def _iris_colour(seen: Floats, white: Floats) -> Floats:
 
     The white of the eye says what the light is: how bright, and of what tint.
     """
-    a, b = 2 * (seen[1:] - white[1:] * seen[0] / white[0])
-    hue, chroma = np.arctan2(b, a), np.hypot(a, b)
+    a, b = seen[1:] - white[1:] * seen[0] / white[0]
     light = 0.85 * min(1.0, float(seen[0] / white[0])) ** 1.5
-    if np.cos(hue) > 0 or light < 0.3:
-        hue = np.clip(hue, 0.8, 1.2)
-    elif chroma > 0.02:
-        chroma = max(chroma, 0.1)
-    return f32([light, chroma * np.cos(hue), chroma * np.sin(hue)])
+    if a > 0 or light < 0.3:
+        return f32([light, 0.1 * np.cos(BROWN), 0.1 * np.sin(BROWN)])
+    return f32([light, a, b])
 
 
 def _disc(points: Floats, level: Floats, opening: Floats, wide: float) -> tuple[Floats, float]:
@@ -97,7 +95,7 @@ def _disc(points: Floats, level: Floats, opening: Floats, wide: float) -> tuple[
     centres = middle + shares * (inner - outer) + lifts * wide * across
     far = np.linalg.norm(points - centres[:, None], axis=2) / wide
     best = (-np.inf, middle, 0.2)
-    for radius in (0.18, 0.2, 0.22):
+    for radius in (0.18, 0.2, 0.22, 0.24):
         disc, ring = far < radius, (far > 1.1 * radius) & (far < 1.6 * radius)
         means = [(part @ level) / np.maximum(part.sum(1), 1) for part in (ring, disc)]
         worth = means[0] - means[1] - (0.4 * shares**2 + 2 * lifts**2)[:, 0]

@@ -19,10 +19,14 @@ Floats = NDArray[Any]
 STEP = 0.6  # cells between points of a path
 FINEST_MM = 0.5  # width of the sharpest tip
 FIRM = (0.5, 0.7, 1.4, 2.0), (1.5, 1.1, 1.0, 0.8)  # widths in mm; N/mm2 for full darkness on wax
+DEPTH = 1.6  # power of a mark's darkness to which the pressure rises
 WOBBLE = 0.06  # widths
 AREAS = "lips", "white"  # drawn at the pressure that gives their colour
 FREE = "iris", "pupil", "frame", "symbol"  # in any crayon; other lines in those of skin
-WEIGHTS = {"iris": (0.6, 1.2, 1.2)}  # of L, a and b by which a crayon is chosen
+WEIGHTS = {
+    "iris": (0.6, 1.2, 1.2),
+    "lips": (0.7, 1.2, 1.2),
+}  # of L, a and b by which a crayon is chosen
 USUAL = (1.2, 1.0, 1.0)
 
 
@@ -141,7 +145,7 @@ def strokes(
         k, share = _crayon(mark, table)
         width = max(FINEST_MM, mark.width * cell_mm)
         # a fine tip has to be pressed harder to leave a mark on wax; darkness goes with the root
-        firm = np.interp(width, *FIRM) * (share * mark.pressure) ** 2
+        firm = np.interp(width, *FIRM) * (share * mark.pressure) ** DEPTH
         wobble = np.cumsum(rng.standard_normal(mark.path.shape), 0) / np.sqrt(len(mark.path))
         path = np.round((mark.path + WOBBLE * mark.width * wobble) * cell_mm, 3).astype(np.float32)
         force = np.clip(np.round(firm * 0.785 * width**2, 3), 0.02, 60).astype(np.float32)
@@ -155,11 +159,17 @@ def _crayon(mark: Mark, table: Floats) -> tuple[int, float]:
     if mark.role not in AREAS:
         off[:, :-1] = np.inf
     if mark.role not in AREAS + FREE:
-        light, hue = table[:, -1, 0], np.arctan2(table[:, -1, 2], table[:, -1, 1])
-        chroma = np.hypot(table[:, -1, 1], table[:, -1, 2])
-        skin = ((hue > 0.7) & (hue < 1.35) & (chroma < 0.22)) | ((chroma < 0.03) & (light < 0.35))
-        if skin.any():
-            off[~skin] = np.inf
+        body = _of_skin(table)
+        if body.any():
+            off[~body] = np.inf
     k, p = np.unravel_index(off.argmin(), off.shape)
     depth = np.linalg.norm(table[k] - table[:, 0].max(0), axis=-1)
     return int(k), float(np.sqrt(depth[p] / depth[-1]))
+
+
+def _of_skin(table: Floats) -> Floats:
+    """The crayons that skin is drawn in: peach to brown, and what is dark and hardly coloured."""
+    a, b = np.moveaxis(table[:, table.shape[1] // 2, 1:], -1, 0)
+    hue, chroma = np.arctan2(b, a), np.hypot(a, b)
+    warm = (hue > 0.6) & (hue < 1.35) & (chroma > 0.06) & (chroma < 0.26)
+    return warm | ((chroma < 0.1) & (np.cos(hue) > -0.3) & (table[:, -1, 0] < 0.45))

@@ -22,12 +22,12 @@ Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
 LAYERS = 4  # crayons in a mixture at most
 SAMPLES = 24  # colours by which a surface is judged
-GRAIN_PRICE = 0.15  # OKLab units per unit of grain
+GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
-DARK_PRICE = 0.12  # for a crayon darker than the surface's darkest, times the difference of lightness
+DARK_PRICE = 0.2  # for a crayon darker than the surface's darkest, times the difference of lightness
 BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
 WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
@@ -219,11 +219,11 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
-    price += GREY_PRICE * np.outer(np.maximum(chroma - 0.05, 0), greyness(heavy))
+    price += GREY_PRICE * np.outer(np.maximum(chroma - 0.025, 0), greyness(heavy))
     loud = np.linalg.norm(hue, axis=1)
-    price += LOUD_PRICE * np.maximum(loud[None] - 1.4 * chroma[:, None] - 0.1, 0)
+    price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
     darkest = np.percentile(sample[:, 0], 10, axis=1)
-    price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.15, 0)
+    price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.08, 0)
     return price.astype(np.float32)
 
 
@@ -239,10 +239,10 @@ def foreign(swatches: Swatches, width_rad: float) -> Floats:
 
 
 def clash(one: Floats, other: Floats) -> Floats:
-    """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are within 60 degrees."""
+    """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are within 44 degrees."""
     dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
     both = np.sqrt((one**2).sum(-1) * (other**2).sum(-1))
-    return np.asarray(np.sqrt(np.maximum(0.5 * both - dot, 0)))
+    return np.asarray(np.sqrt(np.maximum(0.72 * both - dot, 0)))
 
 
 def greyness(colours: Floats) -> Floats:

@@ -65,8 +65,6 @@ class Style:
     swell: Annotated[float, 0, 1] = 0.12  # along a line
     wobble: Annotated[float, 0, 1] = 0.05  # tips sideways
     overshoot: Annotated[float, 0, 3] = 0.15  # tips beyond the ends
-    flat: Annotated[float, 0, 1] = 0.0  # one pressure for all of a colour instead of following its tone
-    fan_deg: Annotated[float, 0, 90] = 0.0  # spread of directions from one colour's areas to another's
     lines: Annotated[float, 0, 5] = 1.0  # amount of outline
     search: Annotated[int, 1, 4] = 1  # how many times a line is drawn until it sits
     closed: bool = False  # outlines go round whole areas instead of along edges
@@ -166,5 +164,4 @@ def with_age(style: Style, age: int) -> Style:
         overshoot=0.2 + 0.6 * young,
         wobble=0.06 + 0.2 * young,
         force_spread=0.15 + 0.25 * young,
-        fan_deg=10 + 20 * young,
     )

@@ -21,7 +21,11 @@ from .subject import Face, Subject
 from .swatches import Swatches
 from .symbols import symbols
 
-FULL, SMALL = 9.0, 6.0  # eye widths in cells: all features; lid, dab and mouth line; below, blots
+LARGE, FULL, SMALL = (
+    18.0,
+    9.0,
+    6.0,
+)  # eye widths in cells: lashes, teeth; all features; lids and mouth
 STRONG = 0.14  # darkness of a face's features against what lies round them
 RIDGE = 0.045  # darkness of a line that landmarks do not explain
 LEAST = 0.1  # pressure below which the hand lifts the crayon
@@ -199,11 +203,11 @@ class _Sitter:
         up = unit(top[1:-1].mean(0) - bottom[1:-1].mean(0))
         outer = top[0] + 0.1 * (top[0] - top[-1])
         lid = np.concatenate([[outer], top[:-1]]) if self.eye >= FULL else top
-        made = self.line(lid, "lid", 0.06, 0.55, 2.2, 1.15, (0.3, 0.3))
-        if self.eye >= 18:  # lashes make it the heaviest line of a face
+        made = self.line(lid, "lid", 0.06, 0.75, 2.2, 1.15, (0.3, 0.3))
+        if self.eye >= LARGE:  # lashes make it the heaviest line of a face
             weight = np.interp(np.linspace(0, 1, len(made)), [0, 0.35, 0.8, 1], [0.4, 1, 0.7, 0])
             shade = f32([0.22, *(0.4 * self.skin[1:])])
-            weight *= np.interp(self.eye, [18, 40], [0.5, 0.9])
+            weight *= np.interp(self.eye, [LARGE, 40], [0.6, 0.9])
             self.add(made + 0.03 * self.eye * up, weight, shade, self.fine, "lid")
         if self.eye >= FULL:
             self.line(bottom[1:-1], "lower lid", 0.07, 0.0, 3.2, 0.8, (0.2, 0.4))
@@ -226,7 +230,13 @@ class _Sitter:
 
         dark = f32([0.2, 0, 0])
         if radius > 1.6 * width:
-            turn(0.95, 0.35, 0.7, float(np.interp(colour[0], [0.3, 0.6], [0.85, 0.55])), colour)
+            bright = float(np.interp(colour[0], [0.3, 0.6], [0, 1]))
+            base = f32([max(0.4, colour[0]), *colour[1:]])
+            turn(0.95, 0.35, 0.5, 0.85 - 0.25 * bright, base)
+            if colour[1] < 0:  # grey, with a breath of blue or green
+                turn(0.85, 0.4, 1.2, 0.35, base * f32([1, 5, 5]))
+            else:
+                turn(0.95, 0.35, 0.6, 0.85 * (1 - bright), dark)
             turn(1.0, 0.95, 1.0, 0.65, colour * f32([0.6, 1, 1]))
             turn(0.45, 0, 0.5, 1.0, dark)
         else:
@@ -260,7 +270,11 @@ class _Sitter:
         length = float(np.linalg.norm(middle[0] - middle[-1]))
         up = unit(top.mean(0) - bottom.mean(0)) * np.linalg.norm(top[2] - bottom[2])
         low, high = curve(bottom - 0.3 * up, 0.3), curve(top + 0.25 * up, 0.3)
-        dark = subject.soft(self.light, 0.5 * self.eye) - self.light_near
+        lid = np.concatenate([bottom, self.face.path(subject.UPPER_LID[side])])
+        bare = self.light[subject.polygons([lid], self.light.shape) > 0.5]
+        if not len(bare):
+            return
+        dark = np.quantile(bare, 0.7) - self.light_near  # than the skin between brow and eye
         band = subject.polygons([np.concatenate([low, high[::-1]])], dark.shape) > 0.5
         if not band.any():
             return
@@ -279,13 +293,13 @@ class _Sitter:
         t = np.linspace(0, 1, max(5, int(0.25 * length / STEP)), dtype=np.float32)[:, None, None]
         hairs = ((1 - t) ** 2 * root + 2 * t * (1 - t) * bend + t * t * tip).astype(np.float32)
         found = sampled(dark, hairs.reshape(-1, 2)).reshape(len(t), number)
-        level = min(1.0, 0.35 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
+        level = min(1.0, 0.45 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
         pressure = level * taper(len(t), 0.2, 0.7)[:, None]
         for i in np.argsort(u):
             self.add(hairs[:, i], pressure[:, i], colour, width, "brow")
 
     def nose(self) -> None:
-        self.line(self.face.path(NOSE), "nose", 0.09, 0.0, 4.5, 0.95, (0.1, 0.1), 1.2)
+        self.line(self.face.path(NOSE), "nose", 0.09, 0.05, 5.5, 1.0, (0.1, 0.1), 1.2)
         for side in BRIDGE:
             self.line(self.face.path(side), "bridge", 0.12, -0.1, 4, 1.1, (0.5, 0.4), 1.2)
         for fold in CHEEK:
@@ -306,7 +320,7 @@ class _Sitter:
 
         def pressed(path: Floats) -> Floats:
             off = np.linalg.norm(sampled(self.near, path) - self.skin, axis=1)
-            return f32(np.clip(0.12 + 2.4 * off, 0, 0.85))
+            return f32(np.clip(0.22 + 2.2 * off, 0, 0.85))
 
         for top, bottom in bands:
             self.loft(top, bottom, "lips", width, pressed, colour)
@@ -349,8 +363,24 @@ class _Sitter:
             light = sampled(self.light_near, path)
             return f32(np.clip(shown + 1.2 * (teeth - light - 0.03), 0, 0.6) * (cavity(path) < 0.2))
 
-        self.loft(top, bottom, "white", 0.9 * self.fine, shade, f32([0.72, 0.01, 0.05]), 0.5)
+        self.loft(top, bottom, "white", 0.9 * self.fine, shade, f32([0.82, 0.0, 0.04]), 0.5)
+        if self.eye >= LARGE:
+            self.gaps(top, bottom, teeth)
         self.loft(top, bottom, "mouth", 0.9 * self.fine, cavity, f32([0.28, 0.08, 0.04]))
+
+    def gaps(self, top: Floats, bottom: Floats, teeth: float) -> None:
+        """Where one tooth ends and the next begins, if the photo shows it."""
+        upper, lower = curve(top), curve(bottom)
+        at = np.arange(len(upper)) * (len(lower) - 1) // (len(upper) - 1)
+        light = sampled(self.light_near, 0.6 * upper + 0.4 * lower[at])
+        dip = smooth(light, round(0.25 * self.eye / STEP)) - light
+        apart = max(2, round(0.07 * self.eye / STEP))
+        for i in range(apart, len(dip) - apart):
+            around = dip[i - apart : i + apart + 1]
+            if dip[i] == around.max() and dip[i] > 0.012 and light[i] > teeth - 0.2:
+                path = curve(np.stack([upper[i], 0.25 * upper[i] + 0.75 * lower[at[i]]]))
+                pressure = min(0.4, 0.15 + 6 * float(dip[i])) * taper(len(path), 0.1, 0.6)
+                self.add(path, pressure, f32([0.6, 0, 0.02]), 0.6 * self.fine, "white")
 
     def contours(self) -> None:
         """Cheek and jaw, where the photo has an edge."""
@@ -389,10 +419,10 @@ class _Sitter:
             top, bottom = (
                 self.face.path(lid[side]) for lid in (subject.UPPER_LID, subject.LOWER_LID)
             )
-            if np.linalg.norm(top[0] - top[-1]) > 0.35 * self.eye:
-                self.line(0.5 * (top + bottom), "lid", 0.3, 0.8, 2, 1.0, (0.1, 0.1), colour=dark)
+            if np.linalg.norm(top[0] - top[-1]) > AWAY * self.eye:
+                self.line(0.5 * (top + bottom), "lid", 0.3, 0.9, 2, 1.6, (0.1, 0.1), colour=dark)
         lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
-        self.line(lips, "mouth", 0.15, 0.3, 2, 1.0, (0.1, 0.1), 1.3)
+        self.line(lips, "mouth", 0.15, 0.6, 2, 1.4, (0.1, 0.1), colour=dark)
 
 
 def _chains(thin: NDArray[np.uint8]) -> list[Floats]:
@@ -426,6 +456,7 @@ def _rosy(seen: Floats, skin: Floats) -> Floats:
     light, a, b = np.median(seen[chroma >= np.median(chroma)], 0)
     hue = np.clip(np.arctan2(b, a), np.deg2rad(12), np.deg2rad(36))
     chroma = 1.15 * np.hypot(a, b) * np.clip(0.12 / np.hypot(*skin[1:]), 1, 1.6)
+    chroma = np.maximum(chroma, 0.35 * light)
     return f32([light, chroma * np.cos(hue), chroma * np.sin(hue)])
 
 

@@ -19,6 +19,7 @@ from .swatches import Swatches
 
 Floats = NDArray[np.float32]
 SHARP = np.float32(1 / 0.012)  # how quickly a dearer choice loses its say, per OKLab unit
+EFFORT = np.float32(0.002)  # OKLab units a level of pressure must be worth
 FAINT = 0.45  # of the lightest pressure of the table: below it the hand stays away
 
 
@@ -41,7 +42,13 @@ def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp
     count, levels = crayons.size, pressures.size
     total = levels**count
     colour, price = np.empty((total, 3), np.float32), np.empty(total, np.float32)
-    cost, mean = np.empty(total, np.float32), np.empty(count, np.float32)
+    cost, mean, work = np.empty(total, np.float32), np.empty(count, np.float32), np.empty(total, np.float32)
+    for m in range(total):
+        rest, step, work[m] = m, total // levels, 0
+        for _ in range(count):
+            work[m] += pressures[rest // step]
+            rest %= step
+            step = max(step // levels, 1)
     for i in range(cells.size):
         at = cells[i]
         if i == 0 or not same:
@@ -49,7 +56,8 @@ def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp
         least = np.float32(np.inf)
         for m in range(total):
             dl, da, db = colour[m, 0] - aim[at, 0], colour[m, 1] - aim[at, 1], colour[m, 2] - aim[at, 2]
-            cost[m] = np.sqrt(dl * dl + da * da + db * db) + price[m] + dark_price * max(np.float32(0), -dl)
+            off = np.sqrt(dl * dl + da * da + db * db) + dark_price * max(np.float32(0), -dl)
+            cost[m] = off + price[m] + EFFORT * work[m]
             least = min(least, cost[m])
         mean[:] = 0
         all_ = np.float32(0)

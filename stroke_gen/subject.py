@@ -189,13 +189,15 @@ def _along_edges(level: Floats, lab: Floats, radius: float) -> Floats:
     """A map that ends where the picture has edges: guided filter, radius in long sides."""
     small = _sized(level, (lab.shape[0], lab.shape[1]))
     cells = max(2, round(radius * max(small.shape)))
-    return np.clip(cv2.ximgproc.guidedFilter(lab, small, cells, EDGE), 0, 1)
+    # OpenCV takes the covariance of a guide in 0..1 for singular, and then ignores its edges
+    smooth = cv2.ximgproc.guidedFilter(255 * lab, small, cells, 255**2 * EDGE)
+    return np.clip(smooth, 0, 1)
 
 
 def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
     """How much care each place deserves (h, w): faces and focus 1, the ground little.
 
-    lab: the photo's OKLab on the work grid.   focus: boxes (x, y, width, height) in fractions of the
+    lab: the photo's OKLab on the work grid.   focus: boxes (x, y, width, height) in parts of the
     picture; each stands for the ellipse that fills it, and gives way to edges.
     """
     shape = lab.shape[0], lab.shape[1]
@@ -205,10 +207,10 @@ def care(subject: Subject, lab: Floats, focus: Sequence[Focus] = ()) -> Floats:
     for x, y, width, height in focus:
         across = (cols / shape[1] - x - width / 2) / max(width / 2, 1e-3)
         along = (rows / shape[0] - y - height / 2) / max(height / 2, 1e-3)
-        ellipse = _fall(np.hypot(along[:, None], across))
-        size = 0.1 * max(width * shape[1], height * shape[0]) / max(shape)
-        kept = _sized(_along_edges(ellipse, np.ascontiguousarray(lab[::2, ::2]), size), shape)
-        out = np.maximum(out, np.maximum(0.6 * ellipse, kept))
+        radius = np.hypot(along[:, None], across)
+        size = 0.25 * max(width * shape[1], height * shape[0]) / max(shape)
+        kept = _along_edges(_fall(radius), np.ascontiguousarray(lab[::2, ::2]), size)
+        out = np.maximum(out, np.maximum(_fall(1.3 * radius), _sized(kept, shape)))
     for face in subject.faces:
         oval = _oval(face, shape, 1.05)
         out = np.maximum(out, np.maximum(oval, soft(_oval(face, shape, 1.2), 0.08 * face.height)))
@@ -224,7 +226,8 @@ def _fall(radius: Floats) -> Floats:
 def skin(subject: Subject, lab: Floats) -> Floats:
     """Where skin is (h, w).
 
-    Faces without eyes, brows, mouth, hair, glasses and paint, and what of the body looks alike.
+    Faces without hair, glasses and paint, and what of the body looks alike. Eyes, brows and mouth
+    count as skin: that is what they are drawn on.
     """
     shape = lab.shape[0], lab.shape[1]
     out = np.zeros(shape, np.float32)
@@ -233,7 +236,7 @@ def skin(subject: Subject, lab: Floats) -> Floats:
         sample = lab[_oval(face, shape, 0.8) * (1 - own) > 0.7]
         like = _alike(lab, sample if len(sample) > MANY else lab[oval > 0.5])
         body = like * like * subject.mask * np.clip(2 - _far(face, shape) / (3 * face.height), 0, 1)
-        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like, 1), body) * (1 - own))
+        out = np.maximum(out, np.maximum(oval * np.minimum(1.6 * like + own, 1), body))
     return soft(out)
 
 

@@ -39,7 +39,7 @@ def part(lab: Floats, care: Floats, subject: Floats, tip: float, least: float) -
     half = (max(2, w // 2), max(2, h // 2))
     small, dear, who = (
         np.asarray(cv2.resize(m, half, interpolation=cv2.INTER_AREA), np.float32)
-        for m in (blur(lab, 0.3 * tip), care, subject)
+        for m in (lab, care, subject)
     )
     scale = 0.5 * tip
     pieces = felzenszwalb(small * WEIGHTS, scale=0.6 * scale**2, sigma=0, min_size=max(4, int(scale**2)))

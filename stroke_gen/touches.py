@@ -119,7 +119,7 @@ def wanted(plan: Plan, now: Floats, coat: Pass, cells: float) -> dict[int, Float
     steps = np.log(swatches.pressures)
 
     def want(k: int) -> Floats:
-        mine = (chosen == k).astype(np.uint8)
+        mine = ((chosen == k) & need).astype(np.uint8)
         gain, best = gains(now, aim, (0, 0), mine, swatches, k, coat)
         here = (mine > 0) & (blur(gain, coat.edge * cells) > coat.gain)
         here = _shapes(here, coat.least * cells * cells)

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from stroke_gen.drawing import Drawing
 
     from .images.read import Photo, Source
-    from .pipeline import Easel, Watch
+    from .pipeline import Easel, Onlooker, Progress
 
 
-Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
 MAX_SEED = 2**63 - 1
 MAX_SIZE = 20_000  # pixels along the long side
 MAX_THREADS = 256
-PHOTO_SIDE = 2048  # pixels of the photo's long side that are read: three times what the planner looks at
+# pixels of the photo's long side that are read: three times what the planner looks at
+PHOTO_SIDE = 2048
 STROKE_SUFFIXES = (".json", ".svg")
 _MM_PER_INCH = 25.4
 
@@ -139,15 +139,16 @@ def draw(
     --------
     >>> from stroke_gen.drawing_file import drawing_from_json
     >>> line = {"crayon": "red", "path": [[10, 10], [90, 50]]}
-    >>> drawing = drawing_from_json({"format": "crayonize drawing", "version": 1, "sheet_mm": [100, 60],
-    ...                              "paper": "smooth", "palette": "box8", "strokes": [line]})
+    >>> house = {"format": "crayonize drawing", "version": 1, "sheet_mm": [100, 60],
+    ...          "paper": "smooth", "palette": "box8", "strokes": [line]}
+    >>> drawing = drawing_from_json(house)
     >>> draw(drawing, size=200).shape
     (120, 200, 3)
     """
     return finish(*redraw(drawing, size, threads, preview, progress, out=out), out, light=light)
 
 
-# ---- what the command line shares ------------------------------------------------------------------------
+# ---- what the command line shares ----------------------------------------------------------------
 
 
 def settings_of(choices: dict[str, Any]) -> Settings:
@@ -162,7 +163,9 @@ def settings_of(choices: dict[str, Any]) -> Settings:
     _check_threads(settings.threads)
     for box in settings.focus:
         if len(box) != 4 or not all(0 <= x <= 1 for x in box):
-            raise ValueError(f"focus: {box!r} is not x, y, w, h as fractions of the picture, from 0 to 1")
+            raise ValueError(
+                f"focus: {box!r} is not x, y, w, h as fractions of the picture, from 0 to 1"
+            )
     return settings.parsed()
 
 
@@ -179,7 +182,8 @@ def check_outputs(
 ) -> None:
     """Before any work: outputs have a format and a folder, and none is an input or another output.
 
-    ValueError for what is wrong with a path, PermissionError for a folder that may not be written to.
+    ValueError for what is wrong with a path, PermissionError for a folder that may not be written
+    to.
     """
     from .images.write import file_format, same_file
 
@@ -205,9 +209,14 @@ def check_outputs(
 
 
 def filming(
-    path: str | os.PathLike[str] | None, seconds: float = 12.0, show_tip: bool = False, light: bool = True
-) -> AbstractContextManager[Watch | None]:
-    """What `sketch` and `redraw` take as `watch` to film the drawing into `path`; nothing for None."""
+    path: str | os.PathLike[str] | None,
+    seconds: float = 12.0,
+    show_tip: bool = False,
+    light: bool = True,
+) -> AbstractContextManager[Onlooker | None]:
+    """What `sketch` and `redraw` take as `watch` to film the drawing into `path`; nothing for
+    None.
+    """
     if path is None:
         return nullcontext()
     workshop()
@@ -218,7 +227,10 @@ def filming(
 
 
 def sketch(
-    image: Source | Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
+    image: Source | Photo,
+    settings: Settings,
+    progress: Progress | None = None,
+    watch: Onlooker | None = None,
 ) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
     from .images.read import open_photo
@@ -240,9 +252,11 @@ def redraw(
     progress: Progress | None = None,
     *,
     out: str | os.PathLike[str] | None = None,
-    watch: Watch | None = None,
+    watch: Onlooker | None = None,
 ) -> tuple[Drawing, Easel]:
-    """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the sheet."""
+    """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the
+    sheet.
+    """
     from stroke_gen.drawing import Drawing, check_drawing
 
     checks.whole(size, 1, MAX_SIZE, "size")
@@ -253,8 +267,9 @@ def redraw(
     else:
         drawing = load_strokes(drawing)
     check_size(drawing.width_mm, drawing.height_mm, size, preview, filmed=watch is not None)
-    easel: Easel = workshop().draw(drawing, size, threads=threads, preview=preview, progress=progress,
-                                   watch=watch)  # fmt: skip
+    easel: Easel = workshop().draw(
+        drawing, size, threads=threads, preview=preview, progress=progress, watch=watch
+    )
     return drawing, easel
 
 
@@ -277,12 +292,16 @@ def load_strokes(
     from .svg.load import load_svg
 
     if Path(path).suffix.lower() == ".svg":
-        return load_svg(path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say)
+        return load_svg(
+            path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say
+        )
     drawing = load_drawing(path)
     return replace(drawing, palette=palette or drawing.palette, paper=paper or drawing.paper)
 
 
-def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None) -> list[Path]:
+def save_steps(
+    drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None
+) -> list[Path]:
     """Pages that show how to draw a Drawing, as a .pdf or .png files; see steps.py."""
     workshop()
     from .pages import steps
@@ -290,10 +309,16 @@ def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress
     return steps.save_steps(drawing, out, progress)
 
 
-def check_size(width: float, height: float, size: int, preview: bool, *, photo: int = 0, filmed: bool = False) -> None:
-    """ValueError if the sheet for a picture of these proportions does not fit into memory; see memory.check_fits."""
+def check_size(
+    width: float, height: float, size: int, preview: bool, *, photo: int = 0, filmed: bool = False
+) -> None:
+    """ValueError if the sheet for a picture of these proportions does not fit into memory; see
+    memory.check_fits.
+    """
     cell = max(width, height) / (size / 2 if preview else size)
-    memory.check_fits(max(1, round(height / cell)), max(1, round(width / cell)), photo=photo, filmed=filmed)
+    memory.check_fits(
+        max(1, round(height / cell)), max(1, round(width / cell)), photo=photo, filmed=filmed
+    )
 
 
 def finish(
@@ -310,7 +335,8 @@ def finish(
     """The picture as uint8 sRGB; written to `out` and its strokes to `strokes` if these are given.
 
     settings: of the photo, to be noted in the picture beside what the drawing itself says.
-    kept: tags of the photo that go into the picture, see metadata.py.   legend: with the crayons used.
+    kept: tags of the photo that go into the picture, see metadata.py.   legend: with the crayons
+        used.
     """
     from stroke_gen.drawing_file import save_drawing
 
@@ -347,7 +373,9 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 
     chosen = {name: getattr(drawing, name) for name in ("paper", "palette", "physics", "seed")}
     if settings:  # the number of threads changes nothing in the picture
-        chosen |= {f.name: getattr(settings, f.name) for f in fields(settings) if f.name != "threads"}
+        chosen |= {
+            f.name: getattr(settings, f.name) for f in fields(settings) if f.name != "threads"
+        }
     named = {name: short(value) for name, value in chosen.items() if value not in (None, ())}
     return {"crayonize": __version__, **named}
 
@@ -363,7 +391,9 @@ def workshop() -> ModuleType:
 
 
 def warm_up() -> None:
-    """Draw a narrow strip in every style, film it, open a live sheet: through all kernels, that they are kept."""
+    """Draw a narrow strip in every style, film it, open a live sheet: through all kernels, that
+    they are kept.
+    """
     import tempfile
 
     import numpy as np
@@ -379,5 +409,7 @@ def warm_up() -> None:
         convert(strip, style=style, size=400, sheet_mm=100.0)
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film.png"
-        convert(strip, size=400, sheet_mm=100.0, preview=True, light=False, timelapse=film, seconds=3)
+        convert(
+            strip, size=400, sheet_mm=100.0, preview=True, light=False, timelapse=film, seconds=3
+        )
     Live(Drawing(10.0, 10.0, "drawing", "box24", ()), 50)

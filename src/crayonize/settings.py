@@ -43,12 +43,13 @@ class Settings:
     preview: bool = False
     age: int | None = None  # of the one who draws, 3 to 10, for style child
     left_handed: bool = False  # hatching from upper left to lower right
-    focus: tuple[tuple[float, float, float, float], ...] = ()  # boxes x, y, w, h in fractions of the picture
+    # boxes x, y, w, h in fractions of the picture
+    focus: tuple[tuple[float, float, float, float], ...] = ()
 
     @cached_property
     def box(self) -> Palette:
         """The palette, read; ValueError if there is none of this name."""
-        from .crayons.palette import load_palette
+        from .crayons.palette_files import load_palette
 
         return load_palette(self.palette)
 

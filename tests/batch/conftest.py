@@ -1,4 +1,6 @@
-"""A folder of small photos, a batch over it in a process of its own, and what must hold after every fault."""
+"""A folder of small photos, a batch over it in a process of its own, and what must hold after every
+fault.
+"""
 
 import hashlib
 import json
@@ -18,7 +20,8 @@ import pytest
 from PIL import Image
 
 HERE = Path(__file__).parent
-HANGS = 300.0  # s after which something is taken to hang for ever: no test says how long anything takes
+# s after which something is taken to hang for ever: no test says how long anything takes
+HANGS = 300.0
 ROOT = HERE.parent.parent
 _CALM: dict[
     tuple[tuple[str, str], ...], dict[str, str]
@@ -39,7 +42,9 @@ def tree(folder: Path) -> dict[str, str]:
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and not path.is_symlink() and ".crayonize" not in path.relative_to(folder).parts
+        if path.is_file()
+        and not path.is_symlink()
+        and ".crayonize" not in path.relative_to(folder).parts
     }
 
 
@@ -138,7 +143,9 @@ class Desk:
         """Start a batch with two workers."""
         if self._before is None:
             self._before = tree(self.photos)
-        run = Batch([self.photos], output or self.pictures, ["-j", "2", *words], prefix or [], **how)
+        run = Batch(
+            [self.photos], output or self.pictures, ["-j", "2", *words], prefix or [], **how
+        )
         self._runs.append(run)
         return run
 

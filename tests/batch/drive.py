@@ -1,4 +1,7 @@
-"""Runs a batch as the command does, with the stand-in for the sketcher: drive.py INPUT... -o OUTPUT ..."""
+"""Runs a batch as the command does, with the stand-in for the sketcher: drive.py INPUT...
+
+-o OUTPUT ...
+"""
 
 import argparse
 import sys

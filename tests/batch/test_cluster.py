@@ -1,4 +1,6 @@
-"""The same folder on a Dask cluster: a scheduler and two workers over TCP, one of them killed on the way."""
+"""The same folder on a Dask cluster: a scheduler and two workers over TCP, one of them killed on
+the way.
+"""
 
 import json
 import os
@@ -29,8 +31,16 @@ class Cluster:
         self._base = base
         self._all: list[subprocess.Popen[bytes]] = []
         told = base / "scheduler.json"
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
-                                     "--scheduler-file", str(told))  # fmt: skip
+        self.scheduler = self._start(
+            "scheduler",
+            "--host",
+            "127.0.0.1",
+            "--port",
+            "0",
+            "--no-dashboard",
+            "--scheduler-file",
+            str(told),
+        )
         end = time.monotonic() + HANGS
         while not told.exists() or not told.read_text():
             assert time.monotonic() < end
@@ -103,7 +113,9 @@ def test_bad_files_and_crashes_are_what_they_are_at_home(desk: Desk, cluster: Cl
     verdicts = [run.status(name) for name in ("text.jpg", "segv.png", "hang.png")]
     assert verdicts == ["failed", "died", "timeout"] and run.count("ok") == 6
     left = [pid for worker in cluster.workers for pid in _session(worker.pid)]
-    assert not [pid for pid in left if "crayonize.batch.worker" in " ".join(psutil.Process(pid).cmdline())]
+    assert not [
+        pid for pid in left if "crayonize.batch.worker" in " ".join(psutil.Process(pid).cmdline())
+    ]
 
 
 def test_a_lost_scheduler_ends_the_run_and_the_next_goes_on(desk: Desk, cluster: Cluster) -> None:

@@ -13,9 +13,19 @@ from crayonize.machine import cores, source
 from crayonize.settings import Settings
 
 OTHER_SETTINGS = {
-    "palette": "box8", "paper": "kraft", "style": "sketch", "force": "heavy", "size": 9, "sheet_mm": 9.0, "seed": 9,
-    "physics": "rudolf2003", "preview": True, "age": 5, "left_handed": True, "focus": ((0.0, 0.0, 1.0, 1.0),),
-}  # fmt: skip
+    "palette": "box8",
+    "paper": "kraft",
+    "style": "sketch",
+    "force": "heavy",
+    "size": 9,
+    "sheet_mm": 9.0,
+    "seed": 9,
+    "physics": "rudolf2003",
+    "preview": True,
+    "age": 5,
+    "left_handed": True,
+    "focus": ((0.0, 0.0, 1.0, 1.0),),
+}
 OTHER_RECIPE = {"light": False, "metadata": "all", "page": "a4", "dpi": 100.0}
 LIMITS = ("max_pixels", "max_bytes")  # they decide whether a photo is drawn, not how
 
@@ -24,7 +34,9 @@ def test_all_that_shapes_a_picture_is_in_the_digest() -> None:
     plain = Recipe(Settings())
     digests = [plain.digest("png"), plain.digest("jpg")]
     for name, value in OTHER_SETTINGS.items():
-        digests.append(replace(plain, settings=replace(plain.settings, **{name: value})).digest("png"))
+        digests.append(
+            replace(plain, settings=replace(plain.settings, **{name: value})).digest("png")
+        )
     for name, value in OTHER_RECIPE.items():
         digests.append(replace(plain, **{name: value}).digest("png"))
     assert len(set(digests)) == len(digests)
@@ -62,7 +74,9 @@ def test_the_version_is_that_of_all_rooms_that_shape_a_drawing() -> None:
     here, generator = source._HERE, source._GENERATOR
     rooms = (here / "wax", here / "light", here / "crayons", here / "data", generator)
     files = source._in(*rooms)
-    assert {"contact.py", "papers.toml", "box24.json", "hand.py", "artist.toml"} <= {file.name for file in files}
+    assert {"contact.py", "papers.toml", "box24.json", "hand.py", "artist.toml"} <= {
+        file.name for file in files
+    }
     assert source.of_drawings() == source.hash_of(files) != source.of_the_wax()
     assert source.hash_of(files[1:]) != source.hash_of(files) == source.hash_of(files[::-1])
 

@@ -1,4 +1,6 @@
-"""The benchmark measures what it says and tells it in both ways; no test here asks how fast anything is."""
+"""The benchmark measures what it says and tells it in both ways; no test here asks how fast
+anything is.
+"""
 
 import json
 import math
@@ -29,9 +31,13 @@ def found():
             return json.loads(json.dumps(bench.PARTS[part](*tiny.get(part, given))))
 
         patch.setattr(bench, "child", here)
-        patch.setattr(bench, "_staged", lambda path, mp: None if path.stem == "small" else staged(path, mp))
+        patch.setattr(
+            bench, "_staged", lambda path, mp: None if path.stem == "small" else staged(path, mp)
+        )
         patch.setattr(measuring, "SIZES_MP", TINY_MP)
-        patch.setattr(measuring, "_starts", lambda folder, repeats, cold: {"help": 0.1, "photo_800": 1.0})
+        patch.setattr(
+            measuring, "_starts", lambda folder, repeats, cold: {"help": 0.1, "photo_800": 1.0}
+        )
         return measuring.measure(quick=True)
 
 
@@ -46,8 +52,18 @@ def numbers(figures):
 
 
 def test_all_is_measured(found):
-    assert set(found) == {"crayonize", "quick", "machine", "start", "cell_steps_per_second", "sheets", "threads",
-                          "live_ms", "yardsticks", "ratios"}  # fmt: skip
+    assert set(found) == {
+        "crayonize",
+        "quick",
+        "machine",
+        "start",
+        "cell_steps_per_second",
+        "sheets",
+        "threads",
+        "live_ms",
+        "yardsticks",
+        "ratios",
+    }
     assert set(found["machine"]) == {"cpu", "cores", "system", "python", "numpy", "numba", "cv2"}
     assert set(found["cell_steps_per_second"]) == {"smearing", "without_smearing"}
     assert [sheet["megapixels"] for sheet in found["sheets"]] == [0.01, 0.02]
@@ -58,8 +74,17 @@ def test_all_is_measured(found):
     assert {"1", str(found["machine"]["cores"])} <= counts == set(found["threads"]["speed_up"])
     assert set(found["live_ms"]) == {"1600", "3508"}
     assert all(set(took) == {"min", "median", "max"} for took in found["live_ms"].values())
-    assert set(found["yardsticks"]) == {"strokes", "strokes_uncompiled", "oil_painting", "stylization"}
-    assert set(found["ratios"]) == {"uncompiled_over_kernels", "whole_over_uncompiled_strokes", "whole_over_filters"}
+    assert set(found["yardsticks"]) == {
+        "strokes",
+        "strokes_uncompiled",
+        "oil_painting",
+        "stylization",
+    }
+    assert set(found["ratios"]) == {
+        "uncompiled_over_kernels",
+        "whole_over_uncompiled_strokes",
+        "whole_over_filters",
+    }
 
 
 def test_figures_are_positive_and_no_stage_is_left_out(found):
@@ -82,8 +107,18 @@ def test_sums_and_ratios_are_of_what_they_say(found):
 def test_table_shows_every_part(found):
     text = table(found)
     assert all(len(line) <= 110 for line in text.splitlines()) and text == text.rstrip()
-    for word in (*bench.STAGES, "with smearing", "peak memory", "threads, 0.02 MP", "A4, 3508", "help", "oilPainting",
-                 "uncompiled", found["machine"]["cpu"], found["machine"]["numba"]):  # fmt: skip
+    for word in (
+        *bench.STAGES,
+        "with smearing",
+        "peak memory",
+        "threads, 0.02 MP",
+        "A4, 3508",
+        "help",
+        "oilPainting",
+        "uncompiled",
+        found["machine"]["cpu"],
+        found["machine"]["numba"],
+    ):
         assert word in text
 
 
@@ -127,17 +162,25 @@ def test_a_part_that_fails_is_named():
 def test_starts_are_timed_warm_and_with_an_empty_cache(tmp_path, monkeypatch):
     asked = []
     monkeypatch.setattr(bench, "child", lambda *_: None)
-    monkeypatch.setattr(measuring.subprocess, "run", lambda line, env, **_: asked.append((line[2:], env)))
+    monkeypatch.setattr(
+        measuring.subprocess, "run", lambda line, env, **_: asked.append((line[2:], env))
+    )
     found = measuring._starts(str(tmp_path), 2, cold=True)
-    assert set(found) == {"help", "photo_800", "photo_800_cold"} and all(seconds > 0 for seconds in found.values())
+    assert set(found) == {"help", "photo_800", "photo_800_cold"} and all(
+        seconds > 0 for seconds in found.values()
+    )
     draws = [(line, env) for line, env in asked if "--help" not in line]
     assert len(draws) == 4 and all(line == draws[0][0] for line, _ in draws)
     assert draws[-1][1]["CRAYONIZE_CACHE"] == str(tmp_path / "cache")
-    assert all(env["CRAYONIZE_CACHE"] != str(tmp_path / "cache") for _, env in draws[:-1] if "CRAYONIZE_CACHE" in env)
+    assert all(
+        env["CRAYONIZE_CACHE"] != str(tmp_path / "cache")
+        for _, env in draws[:-1]
+        if "CRAYONIZE_CACHE" in env
+    )
     assert set(measuring._starts(str(tmp_path), 1, cold=False)) == {"help", "photo_800"}
 
 
-# ---- the command -----------------------------------------------------------------------------------------
+# ---- the command ---------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -188,7 +231,11 @@ def test_folder_that_may_not_be_written_to_is_refused_before_all_work(run, tmp_p
 
     monkeypatch.setattr("pathlib.Path.touch", refuse)
     code, out, err, asked = run("--json", tmp_path / "all.json")
-    assert (code, out, asked) == (1, "", []) and err == f"crayonize: {tmp_path / 'all.json'}: Permission denied\n"
+    assert (code, out, asked) == (
+        1,
+        "",
+        [],
+    ) and err == f"crayonize: {tmp_path / 'all.json'}: Permission denied\n"
 
 
 def test_an_error_leaves_the_old_json(run, found, tmp_path, monkeypatch):

@@ -1,7 +1,9 @@
-"""What `crayonize bench` measures: each part in a process of its own, each figure the best of a few runs.
+"""What `crayonize bench` measures: each part in a process of its own, each figure the best of a few
+runs.
 
-Whole drawings are also set against two yardsticks timed in the same run: the same kernels uncompiled, on a few
-short strokes, and OpenCV's oilPainting and stylization on the same photo. Such ratios hold on other machines too.
+Whole drawings are also set against two yardsticks timed in the same run: the same kernels
+uncompiled, on a few short strokes, and OpenCV's oilPainting and stylization on the same photo. Such
+ratios hold on other machines too.
 """
 
 import os
@@ -55,19 +57,31 @@ def _starts(folder: str, repeats: int, cold: bool) -> Figures:
     parts.child("photo", str(given), 0.4)
 
     def command(*words: object, **environment: str) -> float:
-        line, with_ours = [sys.executable, "-m", "crayonize", *map(str, words)], os.environ | environment
-        return seconds_of(partial(subprocess.run, line, env=with_ours, stdout=subprocess.DEVNULL, check=True))
+        line, with_ours = (
+            [sys.executable, "-m", "crayonize", *map(str, words)],
+            os.environ | environment,
+        )
+        return seconds_of(
+            partial(subprocess.run, line, env=with_ours, stdout=subprocess.DEVNULL, check=True)
+        )
 
     draw = (given, out, "--size", 800, "-q")
     command(*draw)  # from now on the kernels are kept
-    found = {"help": min(command("--help") for _ in range(3)), "photo_800": min(command(*draw) for _ in range(repeats))}
+    found = {
+        "help": min(command("--help") for _ in range(3)),
+        "photo_800": min(command(*draw) for _ in range(repeats)),
+    }
     if cold:
-        found["photo_800_cold"] = command(*draw, CRAYONIZE_CACHE=str(Path(folder) / "cache"), CRAYONIZE_NO_CACHE="")
+        found["photo_800_cold"] = command(
+            *draw, CRAYONIZE_CACHE=str(Path(folder) / "cache"), CRAYONIZE_NO_CACHE=""
+        )
     return found
 
 
 def _yardsticks(megapixels: float, folder: str, repeats: int) -> Figures:
-    """The same strokes by kernels and by plain Python; what OpenCV does with the photo of a sheet."""
+    """The same strokes by kernels and by plain Python; what OpenCV does with the photo of a
+    sheet.
+    """
     return {
         "strokes": parts.child("strokes", 3 + repeats),
         "strokes_uncompiled": parts.child("strokes", 1, NUMBA_DISABLE_JIT="1"),
@@ -76,7 +90,9 @@ def _yardsticks(megapixels: float, folder: str, repeats: int) -> Figures:
 
 
 def _ratios(found: Figures) -> Figures:
-    """What was timed in the same run over the kernels, and under the whole of the smallest drawing."""
+    """What was timed in the same run over the kernels, and under the whole of the smallest
+    drawing.
+    """
     first, beside = found["sheets"][0], found["yardsticks"]
     whole = first["seconds_per_mp"]["all"] * first["cells"] / 1e6
     return {
@@ -84,5 +100,3 @@ def _ratios(found: Figures) -> Figures:
         "whole_over_uncompiled_strokes": whole / beside["strokes_uncompiled"],
         "whole_over_filters": whole / (beside["oil_painting"] + beside["stylization"]),
     }
-
-

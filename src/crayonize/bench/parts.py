@@ -1,7 +1,8 @@
-"""The parts of the benchmark, each run in a process of its own: `python -m crayonize.bench.parts PART ARGUMENTS`.
+"""The parts of the benchmark, each run in a process of its own: `python -m crayonize.bench.parts
+PART ARGUMENTS`.
 
-So none finds memory or caches as another has left them. The photo is made here. A cell-step is one cell under the
-tip at one contact; tips are 24 cells wide.
+So none finds memory or caches as another has left them. The photo is made here. A cell-step is one
+cell under the tip at one contact; tips are 24 cells wide.
 """
 
 import json
@@ -39,13 +40,21 @@ def machine() -> Figures:
     import numba
     import numpy as np
 
-    return {"cpu": _cpu(), "cores": cores.allowed(), "system": platform.platform(terse=True),
-            "python": platform.python_version(), "numpy": np.__version__, "numba": numba.__version__,
-            "cv2": cv2.__version__}  # fmt: skip
+    return {
+        "cpu": _cpu(),
+        "cores": cores.allowed(),
+        "system": platform.platform(terse=True),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "cv2": cv2.__version__,
+    }
 
 
 def photo(path: str, megapixels: float) -> None:
-    """Write a picture that has what photos have: a sky, a sun, hills, a meadow, things with edges, and grain."""
+    """Write a picture that has what photos have: a sky, a sun, hills, a meadow, things with edges,
+    and grain.
+    """
     import cv2
     import numpy as np
 
@@ -63,21 +72,31 @@ def photo(path: str, megapixels: float) -> None:
     picture[np.hypot(x - 0.95, y - 0.62) < 0.13] = 36, 84, 40
     for cells in (24, 160):  # patches of light and shade, and blades of grass
         patches = rng.normal(0, 1, (cells, 3 * cells // 2)).astype(np.float32)
-        picture *= 1 + 0.1 * y[..., None] * cv2.resize(patches, (wide, high), interpolation=cv2.INTER_CUBIC)[..., None]
+        picture *= (
+            1
+            + 0.1
+            * y[..., None]
+            * cv2.resize(patches, (wide, high), interpolation=cv2.INTER_CUBIC)[..., None]
+        )
     picture += rng.normal(0, 3, (high, wide, 1)).astype(np.float32)
     write_image(path, np.clip(picture, 0, 255).astype(np.uint8))
 
 
 def rubbing(side: int, repeats: int) -> Figures:
-    """Cell-steps per second of one thread, with and without smearing, on a sheet of side x side cells."""
+    """Cell-steps per second of one thread, with and without smearing, on a sheet of side x side
+    cells.
+    """
     return {
-        name: max(_rubbed(side, smears) for _ in range(repeats + 1))  # the first one loads the kernels
+        # the first one loads the kernels
+        name: max(_rubbed(side, smears) for _ in range(repeats + 1))
         for name, smears in (("smearing", True), ("without_smearing", False))
     }
 
 
 def sheet(megapixels: float, folder: str, repeats: int) -> Figures:
-    """Seconds per megapixel of each stage from photo to picture, and the memory a cell takes at most."""
+    """Seconds per megapixel of each stage from photo to picture, and the memory a cell takes at
+    most.
+    """
     from stroke_gen.drawing_file import save_drawing
 
     given, small = Path(folder) / f"{megapixels:g}.jpg", Path(folder) / "small.jpg"
@@ -146,7 +165,9 @@ def strokes(repeats: int) -> float:
 
     def drawn() -> float:
         stand = _blank(side)
-        return seconds_of(partial(stand.draw, [_stroke(line, stand, i) for i, line in enumerate(lines)]))
+        return seconds_of(
+            partial(stand.draw, [_stroke(line, stand, i) for i, line in enumerate(lines)])
+        )
 
     return min(drawn() for _ in range(repeats))
 
@@ -155,19 +176,22 @@ def filters(path: str, repeats: int) -> Figures:
     """Seconds that OpenCV takes for its two nearest relatives."""
     import cv2
 
-    picture = cv2.cvtColor(cv2.imread(path), cv2.COLOR_BGR2RGB)  # type: ignore[arg-type]  # None for no picture
+    picture = cv2.cvtColor(cv2.imread(path), cv2.COLOR_BGR2RGB)  # type: ignore[arg-type]
     return {
-        "oil_painting": min(seconds_of(lambda: cv2.xphoto.oilPainting(picture, 7, 1)) for _ in range(repeats)),
+        "oil_painting": min(
+            seconds_of(lambda: cv2.xphoto.oilPainting(picture, 7, 1)) for _ in range(repeats)
+        ),
         "stylization": min(seconds_of(lambda: cv2.stylization(picture)) for _ in range(repeats)),
     }
 
 
 PARTS: dict[str, Callable[..., Any]] = {
-    part.__name__: part for part in (machine, photo, rubbing, sheet, threads, live, strokes, filters)
+    part.__name__: part
+    for part in (machine, photo, rubbing, sheet, threads, live, strokes, filters)
 }
 
 
-# ---- what the parts share --------------------------------------------------------------------------------
+# ---- what the parts share ------------------------------------------------------------------------
 
 
 def child(part: str, *given: Any, **environment: str) -> Any:
@@ -180,7 +204,9 @@ def child(part: str, *given: Any, **environment: str) -> Any:
 
 
 class _Clock:
-    """Where the time from photo to picture goes; looks on (pipeline.Watch) to know one stage from the next."""
+    """Where the time from photo to picture goes; looks on (pipeline.Onlooker) to know one stage from
+    the next.
+    """
 
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(STAGES, 0.0)
@@ -197,7 +223,11 @@ class _Clock:
     def open(self, easel: "Easel") -> None:
         """The paper is made; all that is not done by the easel from now on is planning."""
         self._turn("planning")
-        for name, stage in (("draw", "simulation"), ("seen", "looking"), ("picture_srgb", "rendering")):
+        for name, stage in (
+            ("draw", "simulation"),
+            ("seen", "looking"),
+            ("picture_srgb", "rendering"),
+        ):
             setattr(easel, name, self._timed(stage, getattr(easel, name)))
 
     def strokes(self, strokes: "Sequence[Stroke]", share: float) -> None:
@@ -228,7 +258,9 @@ def _staged(path: Path, megapixels: float) -> "tuple[dict[str, float], Drawing]"
     clock = _Clock()
     given = read_linear(path, api.PHOTO_SIDE)
     with clock.stage("paper"):
-        drawing, easel = workshop.sketch(given, Settings(size=side, sheet_mm=side * CELL_MM), None, clock)
+        drawing, easel = workshop.sketch(
+            given, Settings(size=side, sheet_mm=side * CELL_MM), None, clock
+        )
     picture = easel.picture_srgb()
     with clock.stage("writing"):
         write_image(path.with_suffix(".png"), picture)
@@ -241,7 +273,9 @@ def _rubbed(side: int, smears: bool) -> float:
 
     stand, edge = _blank(side, smears), TIP_CELLS
     ways = range(edge, side - edge + 1, round(0.62 * TIP_CELLS))
-    lines = [[(edge, y), (side - edge, y)] for y in ways] + [[(x, edge), (x, side - edge)] for x in ways]
+    lines = [[(edge, y), (side - edge, y)] for y in ways] + [
+        [(x, edge), (x, side - edge)] for x in ways
+    ]
     drawn = [_stroke(line, stand, i // len(ways)) for i, line in enumerate(lines)]
     seconds = seconds_of(lambda: stand.draw(drawn))
     mask = stand.box.masks[0]
@@ -269,7 +303,12 @@ def _stroke(cells: Sequence[tuple[float, float]], stand: "Easel", crayon: int) -
 
     tip = Tip("blunt", TIP_CELLS * CELL_MM)
     force = np.full(len(cells), FORCE_N_MM2 * math.pi / 4 * tip.width_mm**2, np.float32)
-    return Stroke(np.array(cells, np.float32) * np.float32(CELL_MM), force, stand.box.palette.crayons[crayon].name, tip)
+    return Stroke(
+        np.array(cells, np.float32) * np.float32(CELL_MM),
+        force,
+        stand.box.palette.crayons[crayon].name,
+        tip,
+    )
 
 
 def seconds_of(act: Callable[[], object]) -> float:
@@ -300,12 +339,15 @@ def _peak_bytes() -> int:
     """The most memory this process has held so far; 0 where the system does not tell."""
     with suppress(OSError):
         for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith("VmHWM:"):  # unlike ru_maxrss it leaves out the process that started this one
+            # unlike ru_maxrss it leaves out the process that started this one
+            if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
     with suppress(ImportError):
         import resource
 
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
+            1 if sys.platform == "darwin" else 1024
+        )
     return 0
 
 

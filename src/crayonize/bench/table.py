@@ -11,7 +11,9 @@ def table(found: Figures) -> str:
 
 
 def _lines(found: Figures) -> Iterator[str]:
-    on, starts, rates, sheets = (found[name] for name in ("machine", "start", "cell_steps_per_second", "sheets"))
+    on, starts, rates, sheets = (
+        found[name] for name in ("machine", "start", "cell_steps_per_second", "sheets")
+    )
     yield f"crayonize {found['crayonize']}; {on['cpu']}, {on['cores']} cores; {on['system']}"
     yield f"Python {on['python']}, numpy {on['numpy']}, numba {on['numba']}, OpenCV {on['cv2']}"
     yield _row("\nwax, one thread", "with smearing", "without")

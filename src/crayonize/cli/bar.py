@@ -14,13 +14,14 @@ from stroke_gen.checks import printable
 from ..machine.terminal import Bar
 
 if TYPE_CHECKING:
-    from ..api import Progress
-    from ..pipeline import Easel
+    from ..pipeline import Easel, Progress
 
 
 @contextmanager
 def talk(options: argparse.Namespace) -> Iterator["Progress"]:
-    """The progress line, and our own messages, on stderr; with -q nothing, and warnings only with -v."""
+    """The progress line, and our own messages, on stderr; with -q nothing, and warnings only with
+    -v.
+    """
     import logging
     import warnings
 

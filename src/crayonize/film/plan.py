@@ -1,11 +1,14 @@
-"""A film of a drawing being drawn: bare paper first, then stroke by stroke at a hand's pace, compressed.
+"""A film of a drawing being drawn: bare paper first, then stroke by stroke at a hand's pace,
+compressed.
 
-The frames come from the one simulation. Strokes are drawn side by side, but a tile of the sheet sees them in
-order: right after the last stroke of a frame that touches a tile, the tile is rendered, reduced to the size of
-the film and put aside for that frame. The drawing is not held up, and stays the same, bit for bit.
+The frames come from the one simulation. Strokes are drawn side by side, but a tile of the sheet
+sees them in
+order: right after the last stroke of a frame that touches a tile, the tile is rendered, reduced to
+the size of the film and put aside for that frame. The drawing is not held up, and stays the same,
+bit for bit.
 
-A stroke that has only begun when a frame is due is drawn whole by the simulation; the film shows the part
-that the crayon has passed.
+A stroke that has only begun when a frame is due is drawn whole by the simulation; the film shows
+the part that the crayon has passed.
 """
 
 import itertools
@@ -37,17 +40,27 @@ LIFT_S, DAB_S = 0.25, 0.1  # time from stroke to stroke, and for a dab
 
 
 class Timelapse:
-    """Looks on while an Easel is drawn on, and films it; a context manager, whose end completes the file."""
+    """Looks on while an Easel is drawn on, and films it; a context manager, whose end completes the
+    file.
+    """
 
     def __init__(
-        self, path: str | os.PathLike[str], seconds: float = 12.0, show_tip: bool = False, light: bool = True
+        self,
+        path: str | os.PathLike[str],
+        seconds: float = 12.0,
+        show_tip: bool = False,
+        light: bool = True,
     ) -> None:
-        """path: .webp, .gif, .png, .apng or .mp4. light: shade the relief. ValueError for what cannot be written."""
+        """path: .webp, .gif, .png, .apng or .mp4.
+
+        light: shade the relief. ValueError for what cannot be written.
+        """
         if not 3 <= seconds <= 600:
             raise ValueError(f"seconds: {seconds:g} is not between 3 and 600")
         writers.check(path)
         self.path, self.show_tip, self.shaded = path, show_tip, light
-        self.steps = round((seconds - FIRST - LAST) * writers.FPS)  # frames on which something is drawn
+        # frames on which something is drawn
+        self.steps = round((seconds - FIRST - LAST) * writers.FPS)
         self._promised, self._planned = 0.0, 0
         self._scenes: list[_Scene] = []
         self._news = threading.Condition()
@@ -88,7 +101,9 @@ class Timelapse:
         return scene.watch
 
     def _frames(self) -> Iterator[Frame]:
-        """All frames in order, each as soon as its strokes are drawn; runs in the writer's thread."""
+        """All frames in order, each as soon as its strokes are drawn; runs in the writer's
+        thread.
+        """
         yield self._view.now.copy()
         shown = 0
         for scene in self._all_scenes():
@@ -150,7 +165,8 @@ class _Scene:
     strokes: Sequence[Stroke]
     frames: int
     news: threading.Condition
-    missing: list[int] = field(init=False)  # strokes of each frame that are not yet drawn, and of those after all
+    # strokes of each frame that are not yet drawn, and of those after all
+    missing: list[int] = field(init=False)
 
     def __post_init__(self) -> None:
         self.start, self.end = pace(self.strokes)
@@ -161,9 +177,19 @@ class _Scene:
         self.seen: list[list[tuple[NDArray[np.int64], Frame]]] = [[] for _ in self.missing]
 
     def watch(self, points: Floats, first: NDArray[np.int64], reach: Floats) -> rub.Drawn:
-        """Plan which squares to look at after which stroke: after the last of a frame that touches them."""
+        """Plan which squares to look at after which stroke: after the last of a frame that touches
+        them.
+        """
         view = self.view
-        counted = _due(points, first, reach, self.frame_of, view.cells, view.board(), np.empty((0, 3), np.int64))
+        counted = _due(
+            points,
+            first,
+            reach,
+            self.frame_of,
+            view.cells,
+            view.board(),
+            np.empty((0, 3), np.int64),
+        )
         due = np.empty((counted, 3), np.int64)
         _due(points, first, reach, self.frame_of, view.cells, view.board(), due)
         due = due[::-1]
@@ -205,9 +231,11 @@ class _Scene:
 
 @kernel
 def _due(points, first, reach, frame_of, side, board, due):  # type: ignore[no-untyped-def]
-    """Which squares to look at after which stroke, last stroke first, as (stroke, row, col) into due; their number.
+    """Which squares to look at after which stroke, last stroke first, as (stroke, row, col) into
+    due; their number.
 
-    points (n, 3), reach (strokes,) in cells; board: of each square the frame that it has been claimed for, or -1.
+    points (n, 3), reach (strokes,) in cells; board: of each square the frame that it has been
+    claimed for, or -1.
     """
     rows, cols = board.shape
     number = 0
@@ -219,9 +247,13 @@ def _due(points, first, reach, frame_of, side, board, due):  # type: ignore[no-u
             for p in range(parts):
                 t = (p + 1) / parts
                 x, y = points[j, 0] + t * dx, points[j, 1] + t * dy
-                for ty in range(max(0, int((y - reach[s]) // side)), min(rows - 1, int((y + reach[s]) // side)) + 1):
+                for ty in range(
+                    max(0, int((y - reach[s]) // side)),
+                    min(rows - 1, int((y + reach[s]) // side)) + 1,
+                ):
                     for tx in range(
-                        max(0, int((x - reach[s]) // side)), min(cols - 1, int((x + reach[s]) // side)) + 1
+                        max(0, int((x - reach[s]) // side)),
+                        min(cols - 1, int((x + reach[s]) // side)) + 1,
                     ):
                         if board[ty, tx] != frame_of[s]:
                             board[ty, tx] = frame_of[s]

@@ -1,4 +1,6 @@
-"""What the camera of a film sees: the sheet reduced to the film's size, square by square, and the crayon on it."""
+"""What the camera of a film sees: the sheet reduced to the film's size, square by square, and the
+crayon on it.
+"""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -21,7 +23,8 @@ if TYPE_CHECKING:
     from ..pipeline import Easel
 
 LONG_SIDE = 900  # of a film at most, in pixels; half of it at least, if the drawing has as many
-LOOK = 8  # cells of a square that is looked at as a whole; squares lie within the tiles of the schedule
+# cells of a square that is looked at as a whole; squares lie within the tiles of the schedule
+LOOK = 8
 SHADES = 32768  # steps of light in the table of sRGB codes
 
 Floats = NDArray[np.float32]
@@ -29,7 +32,10 @@ Frame = NDArray[np.uint8]
 
 
 class View:
-    """The sheet at the film's size. now, before: (h, w, 3) sRGB, after this frame's strokes and the last's."""
+    """The sheet at the film's size.
+
+    now, before: (h, w, 3) sRGB, after this frame's strokes and the last's.
+    """
 
     def __init__(self, easel: "Easel", shaded: bool) -> None:
         sheet = easel.sheet
@@ -78,11 +84,22 @@ class View:
         frame = self.now.copy()
         if stroke is None or passed >= 1:
             return frame
-        low = np.floor((stroke.path_mm.min(0) - stroke.tip.width_mm) * self.pixels_per_mm).astype(int).clip(0)
-        high = np.ceil((stroke.path_mm.max(0) + stroke.tip.width_mm) * self.pixels_per_mm).astype(int).clip(0) + 1
+        low = (
+            np.floor((stroke.path_mm.min(0) - stroke.tip.width_mm) * self.pixels_per_mm)
+            .astype(int)
+            .clip(0)
+        )
+        high = (
+            np.ceil((stroke.path_mm.max(0) + stroke.tip.width_mm) * self.pixels_per_mm)
+            .astype(int)
+            .clip(0)
+            + 1
+        )
         part = np.s_[low[1] : high[1], low[0] : high[0]]
         if frame[part].size:
-            ahead = self._swath(along(stroke.path_mm[::-1], 1 - passed), stroke, low, frame[part].shape[:2])
+            ahead = self._swath(
+                along(stroke.path_mm[::-1], 1 - passed), stroke, low, frame[part].shape[:2]
+            )
             ahead &= ~self._swath(along(stroke.path_mm, passed), stroke, low, frame[part].shape[:2])
             np.copyto(frame[part], self.before[part], where=ahead[..., None])
         return frame
@@ -90,10 +107,14 @@ class View:
     def _swath(
         self, path: Floats, stroke: Stroke, corner: NDArray[np.int64], shape: tuple[int, ...]
     ) -> NDArray[np.bool_]:
-        """Where the tip touches on its way along a path, in a part of the film of this corner and shape."""
+        """Where the tip touches on its way along a path, in a part of the film of this corner and
+        shape.
+        """
         mask = np.zeros(shape, np.uint8)
         points = np.round((path * self.pixels_per_mm - corner) * 16).astype(np.int32)
-        width = max(1, round((stroke.tip.width_mm + 3 * self.easel.sheet.cell_mm) * self.pixels_per_mm))
+        width = max(
+            1, round((stroke.tip.width_mm + 3 * self.easel.sheet.cell_mm) * self.pixels_per_mm)
+        )
         cv2.polylines(mask, [points], False, 1, width, cv2.LINE_8, 4)
         return mask > 0
 
@@ -108,20 +129,26 @@ def along(path: Floats, passed: float) -> Floats:
     return np.concatenate([path[:last], [point]]).astype(np.float32)
 
 
-# ---- colours and the crayon in view ------------------------------------------------------------------------
+# ---- colours and the crayon in view --------------------------------------------------------------
 
 
 def colours(easel: "Easel") -> Frame:
     """255 of the colours that can appear: (255, 3) sRGB.
 
-    What can appear: each crayon thin to thick on the paper, and each over each other. Of a box that is not
-    too large all of the first are taken; then in turn the colour farthest from those taken (Gonzalez 1985).
+    What can appear: each crayon thin to thick on the paper, and each over each other. Of a box that
+    is not too large all of the first are taken; then in turn the colour farthest from those taken
+    (Gonzalez 1985).
     """
     crayons = range(len(easel.box.palette.crayons))
-    columns: list[list[tuple[int, float]]] = [[], *([(i, h)] for i in crayons for h in (0.7, 1.5, 3.0, 6.0, 12.0))]
+    columns: list[list[tuple[int, float]]] = [
+        [],
+        *([(i, h)] for i in crayons for h in (0.7, 1.5, 3.0, 6.0, 12.0)),
+    ]
     alone = len(columns)
     columns += [[(i, h), (j, 5.0)] for i in crayons for j in crayons for h in (3.0, 12.0) if i != j]
-    sheet = Sheet(np.zeros((1, len(columns)), np.float32), 1.0, *np.split(easel.sheet.optics, 2, axis=1))
+    sheet = Sheet(
+        np.zeros((1, len(columns)), np.float32), 1.0, *np.split(easel.sheet.optics, 2, axis=1)
+    )
     for cell, column in enumerate(columns):
         sheet.count[cell] = len(column)
         for layer, (crayon, height) in enumerate(column):
@@ -142,7 +169,9 @@ def draw_crayon(frame: Frame, tip: NDArray[np.float32], colour: tuple[int, int, 
     axis = np.array([np.cos(0.9), np.sin(0.9)]) * size
     across = np.array([-axis[1], axis[0]])
 
-    def body(start: float, end: float, half_start: float, half_end: float, rgb: Sequence[float]) -> None:
+    def body(
+        start: float, end: float, half_start: float, half_end: float, rgb: Sequence[float]
+    ) -> None:
         a, b = tip + axis * start, tip + axis * end
         sides = across * half_start, across * half_end
         outline = np.array([a + sides[0], a - sides[0], b - sides[1], b + sides[1]])
@@ -158,7 +187,7 @@ def draw_crayon(frame: Frame, tip: NDArray[np.float32], colour: tuple[int, int, 
         body(band, band + 0.35, 0.8, 0.8, [c * 0.3 for c in colour])
 
 
-# ---- kernels -----------------------------------------------------------------------------------------------
+# ---- kernels -------------------------------------------------------------------------------------
 
 
 @kernel
@@ -173,7 +202,9 @@ def _paste(corners, patches, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def _reduce(corners, factor, light, codes, out):  # type: ignore[no-untyped-def]
-    """Patches (n, side, side, 3) as means of factor x factor cells of linear light from each corner on, in sRGB."""
+    """Patches (n, side, side, 3) as means of factor x factor cells of linear light from each corner
+    on, in sRGB.
+    """
     steps = codes.size - 1
     rows, cols = light.shape[:2]
     for n in range(corners.shape[0]):
