@@ -5,7 +5,7 @@ from itertools import groupby
 import cv2
 import numpy as np
 
-from stroke_gen.swatches import Swatches
+from stroke_gen.swatches import Swatches, covered, firmness
 
 PRESSURES = np.array([0.04, 0.1, 0.2, 0.38, 0.62, 0.95], np.float32)
 PAPER = np.array([0.97, 0.97, 0.95], np.float32)
@@ -16,13 +16,19 @@ COLOURS = {  # linear light of a heavy coat
 }  # fmt: skip
 
 
+OVER_WAX = 0.6  # wax takes hold of wax as a lighter hand does of paper
+
+
 def box(paper: np.ndarray = PAPER) -> Swatches:
     """The table of the nine: more pressure covers more of the ground, and wax lets a quarter of it through."""
     wax = np.array(list(COLOURS.values()), np.float32)[:, None]
-    cover = (1 - np.exp(-PRESSURES / 0.25)).astype(np.float32)[None, :, None]
+    cover, over = (
+        (1 - np.exp(-hold * PRESSURES / 0.25)).astype(np.float32)[None, :, None] for hold in (1.0, OVER_WAX)
+    )
     grain = 0.12 * (1 - np.cbrt(wax.mean(2))) * np.sqrt(cover * (1 - cover))[..., 0]
-    return Swatches(tuple(COLOURS), PRESSURES, 1 - cover + 0.25 * cover * wax, 0.75 * cover * wax + 0 * cover,
-                    grain.astype(np.float32), np.asarray(paper, np.float32))  # fmt: skip
+    a = np.stack([1 - part + 0.25 * part * wax for part in (cover, over)])
+    b = np.stack([0.75 * part * wax for part in (cover, over)])
+    return Swatches(tuple(COLOURS), PRESSURES, a, b, grain.astype(np.float32), np.asarray(paper, np.float32))
 
 
 class FlatSheet:
@@ -45,10 +51,20 @@ class FlatSheet:
         for (crayon, width), part in groupby(strokes, lambda s: (s.crayon, s.tip.width_mm)):
             level = np.zeros(shape, np.float32)
             for stroke in part:
-                pressure = float(stroke.force_n.mean()) / (0.785 * width * width)
+                pressure = float(stroke.force_n.mean()) / (0.785 * width * width) / firmness(width)
                 points = np.round(stroke.path_mm * scale * 16).astype(np.int32)
                 cv2.polylines(level, [points], False, pressure, max(1, round(width * scale[0])), cv2.LINE_8, 4)
-            k, drawn, table = self.table.names.index(crayon), level > 0, self.table
-            for c in range(3):
-                a, b = (np.interp(level[drawn], table.pressures, t[k, :, c]) for t in (table.a, table.b))
-                self.light[drawn, c] = a * self.light[drawn, c] + b
+            self._lay(self.table.names.index(crayon), level)
+
+    def _lay(self, k, level):
+        """One crayon at a pressure (h, w), by the table's two lines."""
+        drawn, table = level > 0, self.table
+        ground = self.light[drawn]
+        waxed = covered(ground, table.paper)
+        for c in range(3):
+            bare, over = (
+                np.interp(level[drawn], table.pressures, table.a[on, k, :, c]) * ground[:, c]
+                + np.interp(level[drawn], table.pressures, table.b[on, k, :, c])
+                for on in (0, 1)
+            )
+            self.light[drawn, c] = bare + waxed * (over - bare)

@@ -10,6 +10,7 @@ from stroke_gen import analysis
 from stroke_gen.colour import oklab
 from stroke_gen.generate import generate
 from stroke_gen.params import Pass, Style, load_style
+from stroke_gen.subject import Subject
 
 WIDTH, HEIGHT = 200.0, 150.0
 CENTRE, RADIUS = np.array([90.0, 70.0]), 40.0  # mm
@@ -32,15 +33,20 @@ def disc(inside=RED, outside=PAPER, scale=2):
 
 def steady(**changes):
     """A style that draws outlines with a steady hand over one coat."""
-    values = {"wobble": 0.0, "overshoot": 0.0, "swell": 0.0, "force_spread": 0.0, "passes": (Pass(kind="base"),)}
+    values = {"wobble": 0.0, "overshoot": 0.0, "swell": 0.0, "force_spread": 0.0, "margin_mm": 0.0,
+              "passes": (Pass(),)}  # fmt: skip
     return Style(**{**values, **changes})
 
 
-def outlines(photo, style, seed=0, table=None):
+def strokes_of(photo, style, seed=0, table=None, mask=None):
     table = table or box()
     sheet = FlatSheet(WIDTH, HEIGHT, table)
-    strokes = generate(photo, WIDTH, HEIGHT, table, style, seed, draw=sheet.draw, look=sheet.look, threads=2)
-    return [s for s in strokes if s.note == "line"]
+    who = Subject((), np.zeros(analysis.work_shape(WIDTH, HEIGHT), np.float32) if mask is None else mask)
+    return generate(photo, who, WIDTH, HEIGHT, table, style, seed, draw=sheet.draw, look=sheet.look, threads=2)
+
+
+def outlines(photo, style, seed=0, table=None, mask=None):
+    return [s for s in strokes_of(photo, style, seed, table, mask) if s.note == "line"]
 
 
 def length(stroke):
@@ -90,10 +96,7 @@ def test_child_closes_its_outlines():
 
 
 def test_child_draws_outlines_first_and_last():
-    table, style = box(), load_style("child")
-    sheet = FlatSheet(WIDTH, HEIGHT, table)
-    strokes = generate(disc(), WIDTH, HEIGHT, table, style, 0, draw=sheet.draw, look=sheet.look, threads=2)
-    notes = [s.note for s in strokes]
+    notes = [s.note for s in strokes_of(disc(), load_style("child"))]
     assert notes[0] == notes[-1] == "line" and set(notes) > {"line"}
 
 
@@ -135,6 +138,53 @@ def test_strong_edges_come_first():
     near = [[np.linalg.norm(s.path_mm - CENTRE, axis=1).max() < RADIUS + 2 for s in lines] for lines in (little, more)]
     assert near[0] and all(near[0])
     assert not all(near[1]) and sum(near[1]) >= len(near[0])
+
+
+def test_silhouettes_come_first():
+    """Of two like discs the one who is drawn has the line, where there is line for one only."""
+    y, x = np.mgrid[:300, :400] / 2
+    photo = np.full((300, 400, 3), 0.6, np.float32)
+    for cx in (50, 150):
+        photo[np.hypot(x - cx, y - 75) < 35] = (0.25, 0.25, 0.25)
+    cells = analysis.work_shape(WIDTH, HEIGHT)
+    x = np.arange(cells[1]) * WIDTH / cells[1]
+    for left in (True, False):
+        mask = np.tile(np.where((x < 100) == left, 1, 0).astype(np.float32), (cells[0], 1))
+        y_, x_ = np.mgrid[: cells[0], : cells[1]] * (WIDTH / cells[1])
+        mask *= np.hypot(x_ - (50 if left else 150), y_ - 75) < 35
+        lines = outlines(photo, steady(lines=0.12), mask=mask)
+        assert lines and all((s.path_mm[:, 0].max() < 100) == left for s in lines)
+
+
+@pytest.mark.parametrize("style", ["artist", "sketch", "fine", "solid", "child"])
+def test_lines_stay_inside_the_margin(style):
+    photo = np.random.default_rng(2).random((6, 8, 3)).astype(np.float32).repeat(40, 0).repeat(40, 1)
+    style = replace(load_style(style), wobble=0.0, overshoot=0.0, margin_mm=15.0, fade=0.0, search=1)
+    lines = outlines(photo, style)
+    points = np.concatenate([s.path_mm for s in lines])
+    outside = (points < 12).any(1) | (points > np.array([WIDTH, HEIGHT]) - 12).any(1)
+    assert len(lines) > 5 and outside.mean() < 0.01
+
+
+def test_a_line_is_darker_than_both_sides_of_it():
+    """A border between two middle tones, seen on a sheet where all is drawn."""
+    table, photo = box(), disc((0.25, 0.12, 0.06), (0.35, 0.3, 0.25))
+    sheet = FlatSheet(WIDTH, HEIGHT, table)
+    who = Subject((), np.zeros(analysis.work_shape(WIDTH, HEIGHT), np.float32))
+    generate(photo, who, WIDTH, HEIGHT, table, steady(), 0, draw=sheet.draw, look=sheet.look, threads=2)
+    light = oklab(sheet.light)[..., 0]
+    y, x = np.mgrid[: light.shape[0], : light.shape[1]] * (WIDTH / light.shape[1])
+    off = np.hypot(x - CENTRE[0], y - CENTRE[1]) - RADIUS
+    line, inner, outer = (np.median(light[on]) for on in (np.abs(off) < 0.5, (off < -6) & (off > -15),
+                                                          (off > 6) & (off < 15)))  # fmt: skip
+    assert line < inner - 0.04 and line < outer - 0.04
+
+
+def test_a_line_is_drawn_as_often_as_the_hand_searches():
+    once, thrice = (outlines(disc(), steady(search=n)) for n in (1, 3))
+    assert len(thrice) == 3 * len(once) > 0
+    hands = [outlines(disc(), steady(search=2, wobble=0.2))[i].path_mm for i in (0, len(once))]
+    assert not np.array_equal(*hands)
 
 
 def test_light_lines_before_dark_ones():

@@ -52,9 +52,10 @@ def full(pressure=0.3, shape=(SIZE, SIZE)):
     return np.full(shape, pressure, np.float32)
 
 
-def drawn(want, field, settings, seed=0, coherence=None):
+def drawn(want, field, settings, seed=0, coherence=None, gaps=1.0):
     coherence = np.zeros_like(want) if coherence is None else coherence
-    return hatch(want, field, coherence, settings, np.random.default_rng(seed))
+    wider = np.broadcast_to(np.asarray(gaps, np.float32), want.shape).copy()
+    return hatch(want, wider, field, coherence, settings, np.random.default_rng(seed))
 
 
 def stroke_of(paths):
@@ -104,6 +105,36 @@ def test_as_much_line_as_the_spacing_asks_for_at_every_angle(spacing, degrees):
     """The table of crayons was measured with lines one spacing apart; more of them would be darker."""
     length = segments(drawn(full(), constant(degrees), how(spacing)))[2].sum()
     assert length * spacing / SIZE**2 == pytest.approx(1, abs=0.12)
+
+
+@pytest.mark.parametrize("degrees", [0, -50])
+def test_wider_gaps_mean_as_much_less_line(degrees):
+    length = [segments(drawn(full(), constant(degrees), how(), gaps=gaps))[2].sum() for gaps in (1.0, 1.5, 2.5)]
+    for gaps, some in zip((1.5, 2.5), length[1:], strict=True):
+        assert some * gaps / length[0] == pytest.approx(1, abs=0.15)
+
+
+def test_gaps_are_wide_where_they_are_wide():
+    """An open ground beside a closed subject, on one sheet."""
+    gaps = np.ones((SIZE, SIZE), np.float32)
+    gaps[:, SIZE // 2 :] = 2.5
+    paths = drawn(full(), constant(90), how(), gaps=gaps)
+    middle, _, length = segments(paths)
+    left, right = (length[on].sum() for on in (middle[:, 0] < 74, middle[:, 0] > 86))
+    assert left / right == pytest.approx(2.5, rel=0.2)
+    leg = leg_of(paths)
+    open_ = paths.points[:, 0] > 90
+    apart_ = [apart(paths.points[open_ & (leg == n)], paths.points[leg != n]).min() for n in np.unique(leg[open_])]
+    assert min(apart_) > 0.35 * 2.5 * 3.0
+
+
+@pytest.mark.parametrize("gaps", [1.0, 3.0])
+def test_no_line_where_nothing_is_wanted(gaps):
+    want = full()
+    want[:, 60:] = 0
+    assert drawn(0 * want, constant(20), how(), gaps=gaps).points.size == 0
+    paths = drawn(want, constant(20), how(gap=0.0), gaps=gaps)
+    assert paths.points.size and paths.points[:, 0].max() < 60
 
 
 @pytest.mark.parametrize("name", FIELDS)

@@ -51,7 +51,7 @@ def test_shipped_style_is_whole(name):
     style = load_style(name)
     assert style.title == style_names()[name] and style.passes
     assert len({coat.name for coat in style.passes}) == len(style.passes), "coats are told apart by name"
-    assert style.passes[0].kind == "base"
+    assert style.passes[0].kind == "fill"
     for part in (style, *style.passes):
         for f in fields(part):
             if f.name != "passes" and (limit := limits(type(part), f.name)):
@@ -84,9 +84,9 @@ def test_every_key_says_what_it_does(kind):
 
 def test_a_users_style(tmp_path):
     head = 'title = "mine"\ntip_mm = 3\nclosed = true\n'
-    style = user_style(tmp_path, head + '[[pass]]\nkind = "base"\n[[pass]]\nlegs = 4\n')
+    style = user_style(tmp_path, head + '[[pass]]\nkind = "touch"\n[[pass]]\nlegs = 4\n')
     assert (style.title, style.tip_mm, style.closed) == ("mine", 3, True)
-    assert [coat.kind for coat in style.passes] == ["base", "free"] and style.passes[1].legs == 4
+    assert [coat.kind for coat in style.passes] == ["touch", "fill"] and style.passes[1].legs == 4
     assert style.chroma == Style.chroma
 
 
@@ -114,7 +114,7 @@ def test_a_shipped_style_copied_by_a_user_is_the_same(tmp_path):
     ("chroma = inf", ("chroma", "inf")),
     ("lift = -0.1", ("lift", "-0.1")),
     ("[[pass]]\ngain = 1.5", ("pass 1", "gain", "1.5")), ('title = "two\\nlines"', ("title",)),
-    ('[[pass]]\nkind = "shading"', ("pass 1", "kind", "'shading'", "shade")),
+    ('[[pass]]\nkind = "shading"', ("pass 1", "kind", "'shading'", "touch")),
     ('[[pass]]\nname = ""', ("pass 1", "name")),
     ("pass = 3", ("pass",)), ("pass = [1]", ("pass",)), ("tip_mm = ", ("not TOML",)),
 ], ids=lambda v: v if isinstance(v, str) else "")  # fmt: skip
@@ -141,7 +141,7 @@ def test_unknown_styles(name, hint):
 
 
 def test_reading_a_style_leaves_its_table_alone():
-    table = {"tip_mm": 2.0, "pass": [{"kind": "base"}]}
+    table = {"tip_mm": 2.0, "pass": [{"kind": "add"}]}
     assert style_from(table, "here") == style_from(table, "here")
 
 
@@ -172,7 +172,7 @@ def test_the_younger_the_wilder():
 
     for name in ("tip_mm", "overshoot", "wobble", "force_spread", "fan_deg"):
         assert falls([getattr(style, name) for style in ages]), name
-    for name in ("crayons", "recipes"):
+    for name in ("crayons", "symbols"):
         assert falls([-getattr(style, name) for style in ages]), name
     for coat in range(len(ages[0].passes)):
         assert falls([style.passes[coat].spacing for style in ages]), "wider gaps"
