@@ -204,9 +204,7 @@ def child(part: str, *given: Any, **environment: str) -> Any:
 
 
 class _Clock:
-    """Where the time from photo to picture goes; looks on (pipeline.Onlooker) to know one stage from
-    the next.
-    """
+    """Where the time from photo to picture goes; an Onlooker, to know one stage from the next."""
 
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(STAGES, 0.0)
