@@ -4,7 +4,7 @@ import pytest
 from bench_sheet import CRAYONS, Bench
 
 from crayonize.crayons.palette import Crayon, Palette
-from crayonize.wax import rub
+from crayonize.wax.physics import physics
 
 
 @pytest.fixture(scope="session")
@@ -16,4 +16,4 @@ def crayons() -> Palette:
 @pytest.fixture(params=["metric", "rudolf2003"])
 def bench(request: pytest.FixtureRequest, crayons: Palette) -> Bench:
     """A bench for each physics preset."""
-    return Bench(rub.physics(request.param), crayons)
+    return Bench(physics(request.param), crayons)

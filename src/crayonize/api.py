@@ -96,7 +96,7 @@ def draw(
 ) -> NDArray[np.uint8]:
     """The picture of a Drawing, or of a drawing's file: uint8 sRGB (h, w, 3), its long side `size` pixels.
 
-    preview: without smearing and at half the size. The rest, and the errors, as in `convert`.
+    preview: at half the size. The rest, and the errors, as in `convert`.
     """
     return finish(*redraw(drawing, size, threads, preview, progress, out=out), out, light=light)
 

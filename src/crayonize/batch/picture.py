@@ -108,13 +108,14 @@ def _check(recipe: Recipe) -> None:
     from stroke_gen import params
 
     from ..crayons.palette import load_palette
-    from ..wax import paper, rub
+    from ..wax import paper
+    from ..wax.physics import physics
 
     settings = recipe.settings
     load_palette(settings.palette)
     paper.load_paper(settings.paper)
     params.with_force(params.load_style(settings.style), settings.force)
-    rub.physics(settings.physics)
+    physics(settings.physics)
 
 
 def _is_ours(path: Path) -> bool:

@@ -403,7 +403,7 @@ def _add_size(parser: _Parser) -> None:
     add = parser.add_argument
     add("--size", type=_whole, default=Settings.size, help="long side in pixels, 1 to 20000 (%(default)s)")
     add("--threads", type=_whole, help="at most so many at once; the picture stays the same (all cores)")
-    add("--preview", action="store_true", help="quick: half the size, and no smearing")
+    add("--preview", action="store_true", help="quick: half the size")
     add("--no-light", dest="light", action="store_false", help="no shading of the relief")
 
 

@@ -374,7 +374,7 @@ def _colours(easel: "Easel") -> Frame:
     columns += [[(i, h), (j, 5.0)] for i in crayons for j in crayons for h in (3.0, 12.0) if i != j]
     sheet = Sheet(np.zeros((1, len(columns)), np.float32), 1.0, *np.split(easel.sheet.optics, 2, axis=1))
     for cell, column in enumerate(columns):
-        sheet.count[cell] = len(column)
+        sheet.used[cell] = len(column)
         for layer, (crayon, height) in enumerate(column):
             sheet.crayon[cell, layer], sheet.layer[cell, layer] = crayon, height
     seen = optics.render(sheet, easel.ground, light=False)[0]
