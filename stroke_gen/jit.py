@@ -1,32 +1,29 @@
-"""The one way a kernel is compiled: lazily, without the interpreter lock, kept on disk.
+"""The one way a kernel is compiled: lazily, at its first call, and without the interpreter lock.
 
-A kernel calls only kernels of its own file and takes every constant as an argument: numba's disk
-cache does not notice a change in another file. Where the cache may live is decided before this
-module is imported, by the environment variable NUMBA_CACHE_DIR; CRAYONIZE_NO_CACHE turns it off.
+numba's own disk cache is never used, as it does not notice a change in another file: the program that draws
+keeps compiled kernels itself, under the source of all files beside them. So a kernel and the constants it
+reads stand in one package, as do the kernels that it calls.
 
 Kernels write their sums and minima out as loops: to load one that calls an array's `min` or `mean`, numba first
 imports half of itself and scipy, a quarter of a second.
 """
 
-import os
 from collections.abc import Callable
 from typing import Any
 
 import numba
 
-CACHE = not os.environ.get("CRAYONIZE_NO_CACHE")
-
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` at its first call; threads may run it side by side."""
-    compiled: Callable[..., Any] = numba.njit(cache=CACHE, nogil=True, error_model="numpy")(function)
+    compiled: Callable[..., Any] = numba.njit(nogil=True, error_model="numpy")(function)
     return compiled
 
 
 def sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """As `kernel`, for plain sums: the order of additions is the compiler's, so that it can use vectors."""
     relaxed = {"reassoc", "nsz"}
-    compiled: Callable[..., Any] = numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=relaxed)(function)
+    compiled: Callable[..., Any] = numba.njit(nogil=True, error_model="numpy", fastmath=relaxed)(function)
     return compiled
 
 
@@ -53,6 +50,6 @@ def lean_sum_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _lean(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
-    options |= {"cache": CACHE, "nogil": True, "error_model": "numpy", "_nrt": False}
+    options |= {"nogil": True, "error_model": "numpy", "_nrt": False}
     compiled: Callable[..., Any] = numba.njit(**options)(function)
     return compiled

@@ -7,8 +7,8 @@ import numpy as np
 
 from crayonize.crayons.palette import Palette
 from crayonize.wax import rub
-from crayonize.wax.paper import Paper, tooth
 from crayonize.wax.box import Box
+from crayonize.wax.paper import Paper, tooth
 from crayonize.wax.physics import Physics
 from crayonize.wax.sheet import Sheet
 from stroke_gen.drawing import Stroke, Tip

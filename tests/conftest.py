@@ -1,10 +1,16 @@
-"""Fixtures: a bench on which strokes are drawn with either physics."""
+"""Fixtures: a bench on which strokes are drawn with either physics. """
 
 import pytest
 from bench_sheet import CRAYONS, Bench
 
 from crayonize.crayons.palette import Crayon, Palette
+from crayonize.machine import kernels
 from crayonize.wax.physics import physics
+
+
+def pytest_collection_finish() -> None:
+    """All modules with kernels have been imported: take these from the cache, by their source."""
+    kernels.keep_kernels()
 
 
 @pytest.fixture(scope="session")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from crayonize.crayons.palette import load_palette
 from crayonize.images.icc import encode_srgb
 from crayonize.images.write import write_image
+from crayonize.machine import kernels
 from crayonize.pipeline import Easel, draw, easel
 from crayonize.wax.paper import colour_linear, load_paper
 from stroke_gen.drawing import Drawing, Stroke, Tip
@@ -38,6 +39,7 @@ def main() -> None:
     parser.add_argument("out", type=Path, metavar="OUT", help="folder for the figures")
     parser.add_argument("--cell", type=float, default=0.1, metavar="MM", help="side of a cell (default: 0.1)")
     options = parser.parse_args()
+    kernels.keep_kernels()
     options.out.mkdir(parents=True, exist_ok=True)
     for name, figure in FIGURES.items():
         path = options.out / f"{name}.png"

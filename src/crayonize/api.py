@@ -13,11 +13,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stroke_gen import checks
 from stroke_gen.checks import did_you_mean, quoted
 
 from . import __version__
-from .machine import folder as cache
-from .machine import memory
+from .machine import kernels, memory
 from .settings import Settings
 
 if TYPE_CHECKING:
@@ -29,11 +29,12 @@ if TYPE_CHECKING:
 
     from stroke_gen.drawing import Drawing
 
+    from .images.read import Photo, Source
     from .pipeline import Easel, Watch
 
-    Photo = str | os.PathLike[str] | Image | NDArray[Any]
 
 Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
+MAX_SEED = 2**63 - 1
 MAX_SIZE = 20_000  # pixels along the long side
 MAX_THREADS = 256
 PHOTO_SIDE = 2048  # pixels of the photo's long side that are read: three times what the planner looks at
@@ -42,7 +43,7 @@ _MM_PER_INCH = 25.4
 
 
 def convert(
-    image: Photo,
+    image: Source,
     out: str | os.PathLike[str] | None = None,
     *,
     strokes: str | os.PathLike[str] | None = None,
@@ -73,7 +74,7 @@ def convert(
     from PIL import Image
 
     settings = settings_of(choices)
-    check_outputs([image, *used_files(settings)], out, strokes, timelapse)
+    check_outputs([image, *settings.files()], out, strokes, timelapse)
     with filming(timelapse, seconds, show_tip, light) as watch:
         drawn = sketch(image, settings, progress, watch)
     picture = finish(*drawn, out, strokes, light=light, settings=settings, legend=legend)
@@ -111,29 +112,18 @@ def settings_of(choices: dict[str, Any]) -> Settings:
         if name not in known:
             raise TypeError(f"there is no choice {quoted(name)}{did_you_mean(name, known)}")
     settings = Settings(**choices)
-    _check_whole("size", settings.size, 1, MAX_SIZE)
-    _check_whole("seed", settings.seed, 0, 2**63 - 1)
+    checks.whole(settings.size, 1, MAX_SIZE, "size")
+    checks.whole(settings.seed, 0, MAX_SEED, "seed", "2^63 - 1")
     _check_threads(settings.threads)
     for box in settings.focus:
         if len(box) != 4 or not all(0 <= x <= 1 for x in box):
             raise ValueError(f"focus: {box!r} is not x, y, w, h as fractions of the picture, from 0 to 1")
-    return settings
-
-
-def _check_whole(name: str, value: Any, low: int, high: int) -> None:
-    if type(value) is not int or not low <= value <= high:
-        raise ValueError(f"{name}: {value!r} is not a whole number from {low} to {high}")
+    return settings.parsed()
 
 
 def _check_threads(threads: int | None) -> None:
     if threads is not None:
-        _check_whole("threads", threads, 1, MAX_THREADS)
-
-
-def used_files(settings: Settings) -> list[str]:
-    """Palette, style and paper, where they are given as files."""
-    given = (settings.palette, settings.style, settings.paper)
-    return [source for source in given if isinstance(source, str) and Path(source).is_file()]
+        checks.whole(threads, 1, MAX_THREADS, "threads")
 
 
 def check_outputs(
@@ -178,21 +168,22 @@ def filming(
     workshop()
     from .film import plan as timelapse
 
-    cache.keep_kernels()
+    kernels.keep_kernels()
     return timelapse.Timelapse(path, seconds, show_tip, light)
 
 
 def sketch(
-    image: Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
+    image: Source | Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
-    from .images.read import measured, read_linear
-    from .wax import paper
+    from .images.read import open_photo
+    from .wax.paper import colour_linear
 
-    width, height, reading = measured(image)
-    check_size(width, height, settings.size, settings.preview, photo=reading, filmed=watch is not None)
-    ground = paper.colour_linear(paper.load_paper(settings.paper).colour)
-    drawn: tuple[Drawing, Easel] = workshop().sketch(read_linear(image, PHOTO_SIDE, ground), settings, progress, watch)
+    with open_photo(image) as photo:
+        check_size(photo.width, photo.height, settings.size, settings.preview, photo=photo.decoding,
+                   filmed=watch is not None)  # fmt: skip
+        light = photo.light(PHOTO_SIDE, colour_linear(settings.ground.colour))
+    drawn: tuple[Drawing, Easel] = workshop().sketch(light, settings, progress, watch)
     return drawn
 
 
@@ -209,7 +200,7 @@ def redraw(
     """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the sheet."""
     from stroke_gen.drawing import Drawing, check_drawing
 
-    _check_whole("size", size, 1, MAX_SIZE)
+    checks.whole(size, 1, MAX_SIZE, "size")
     _check_threads(threads)
     check_outputs([drawing], out)
     if isinstance(drawing, Drawing):
@@ -293,7 +284,7 @@ def finish(
         if Path(strokes).suffix.lower() == ".svg":
             from .svg.save import save_svg
 
-            save_svg(drawing, strokes)
+            save_svg(drawing, strokes, easel.box.palette)
         else:
             save_drawing(drawing, strokes)
     return picture
@@ -320,10 +311,9 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 def workshop() -> ModuleType:
     """The pipeline with all its kernels, these from the compile cache."""
     memory.share_heaps()
-    cache.before_kernels()
     from . import pipeline
 
-    cache.keep_kernels()
+    kernels.keep_kernels()
     return pipeline
 
 

@@ -1,14 +1,12 @@
 """The two conductors: a photo becomes a Drawing, a Drawing becomes a picture."""
 
-import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stroke_gen import params
 from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
 from stroke_gen.generate import generate
@@ -16,6 +14,7 @@ from stroke_gen.generate import generate
 from .crayons import calibration
 from .crayons.palette import Palette, load_palette
 from .light import optics
+from .machine import cores
 from .settings import Settings
 from .wax import paper, rub
 from .wax.box import Box
@@ -72,16 +71,26 @@ class Easel:
         return optics.render_reduced(self.sheet, self.ground, shape, threads=self.threads)
 
 
-def easel(drawing: Drawing, size: int, threads: int | None = None, smears: bool = True) -> Easel:
-    """A blank sheet for a drawing, `size` cells along its long side."""
-    palette = load_palette(drawing.palette)
-    sheet_paper = paper.load_paper(drawing.paper)
+def easel(
+    drawing: Drawing,
+    size: int,
+    threads: int | None = None,
+    smears: bool = True,
+    palette: Palette | None = None,
+    ground: paper.Paper | None = None,
+) -> Easel:
+    """A blank sheet for a drawing, `size` cells along its long side.
+
+    palette, ground: palette and paper of the drawing, where they have been read already.
+    """
+    palette = palette or load_palette(drawing.palette)
+    sheet_paper = ground or paper.load_paper(drawing.paper)
     cell_mm = max(drawing.width_mm, drawing.height_mm) / size
     rows, cols = max(1, round(drawing.height_mm / cell_mm)), max(1, round(drawing.width_mm / cell_mm))
     tooth = paper.tooth(sheet_paper, rows, cols, cell_mm, drawing.seed)
     sheet = Sheet(tooth, cell_mm, *_optics(palette))
     box = Box(palette, physics(drawing.physics), cell_mm, drawing.seed)
-    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or os.cpu_count() or 1, smears)
+    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or cores.allowed(), smears)
 
 
 def _optics(palette: Palette) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -102,20 +111,12 @@ def draw(
 ) -> Easel:
     """A drawing on paper, `size` cells along the long side; `.picture()` shows it.
 
-    preview: at half the size (section 5 of the paper), in a third of the time.
+    preview: at half the size (section 5 of the paper).
     """
     stand = easel(drawing, max(1, size // 2) if preview else size, threads)
     stand.show_to(watch)
     stand.draw(drawing.strokes, progress and (lambda done, all_: progress("drawing", done / all_)))
     return stand
-
-
-def _style(settings: Settings) -> params.Style:
-    """The style as this hand has it."""
-    style = params.with_force(params.load_style(settings.style), settings.force)
-    if settings.age is not None:
-        style = params.with_age(style, settings.age)
-    return replace(style, wrist_deg=-style.wrist_deg) if settings.left_handed else style
 
 
 def sketch(
@@ -126,12 +127,12 @@ def sketch(
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
     photo = fit(photo, work_shape(width_mm, height_mm))  # all that is looked at; the large one may go
-    style = _style(settings)
+    style = settings.hand
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
-    size = max(1, settings.size // 2) if settings.preview else settings.size
-    stand = easel(blank, size, settings.threads)
+    stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
+                  palette=settings.box, ground=settings.ground)  # fmt: skip
     stand.show_to(watch)
-    table = calibration.swatches(stand.box.palette, paper.load_paper(settings.paper), settings.physics, stand.threads)
+    table = calibration.swatches(settings.box, settings.ground, settings.physics, stand.threads)
     stages = len(style.passes) + 1 + style.lines_first
     done = 0
 

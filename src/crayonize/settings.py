@@ -1,7 +1,26 @@
-"""What a user may choose for a drawing. No heavy imports: the command line reads its defaults here."""
+"""What a user may choose for a drawing, and what the choices mean, parsed once.
 
-from dataclasses import dataclass
-from typing import Any
+No heavy imports: the command line reads its defaults here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stroke_gen.params import Style
+
+    from .crayons.palette import Palette
+    from .wax.paper import Paper
+
+_PARSED = {  # what is kept -> the choices that it comes from
+    "box": {"palette"},
+    "ground": {"paper"},
+    "hand": {"style", "force", "age", "left_handed"},
+}
 
 
 @dataclass(frozen=True)
@@ -21,3 +40,53 @@ class Settings:
     age: int | None = None  # of the one who draws, 3 to 10, for style child
     left_handed: bool = False  # hatching from upper left to lower right
     focus: tuple[tuple[float, float, float, float], ...] = ()  # boxes x, y, w, h in fractions of the picture
+
+    @cached_property
+    def box(self) -> Palette:
+        """The palette, read; ValueError if there is none of this name."""
+        from .crayons.palette import load_palette
+
+        return load_palette(self.palette)
+
+    @cached_property
+    def ground(self) -> Paper:
+        """The paper, read; ValueError if there is none of this name."""
+        from .wax.paper import load_paper
+
+        return load_paper(self.paper)
+
+    @cached_property
+    def hand(self) -> Style:
+        """The style as this hand has it: its force, its age, left or right."""
+        from stroke_gen import params
+
+        style = params.with_force(params.load_style(self.style), self.force)
+        if self.age is not None:
+            style = params.with_age(style, self.age)
+        return replace(style, wrist_deg=-style.wrist_deg) if self.left_handed else style
+
+    def parsed(self) -> Settings:
+        """The same, with palette, paper and style read; ValueError for one that there is not."""
+        _ = self.box, self.ground, self.hand
+        return self
+
+    def changed(self, **changes: Any) -> Settings:
+        """The same settings but for some; what has been parsed is not parsed again.
+
+        >>> Settings(size=800).changed(seed=7).size
+        800
+        """
+        new = replace(self, **changes)
+        for name, sources in _PARSED.items():
+            if name in self.__dict__ and not sources & changes.keys():
+                new.__dict__[name] = self.__dict__[name]
+        return new
+
+    def files(self) -> list[Path]:
+        """Palette, paper and style, where they are given as files."""
+        given = (self.palette, self.paper, self.style)
+        return [Path(one) for one in given if isinstance(one, str) and Path(one).is_file()]
+
+    def plain(self) -> dict[str, Any]:
+        """The choices alone, by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}

@@ -3,7 +3,9 @@
 import argparse
 import sys
 
-from crayonize import batch
+from crayonize.batch.conductor import run
+from crayonize.batch.job import Recipe
+from crayonize.cli import folders
 from crayonize.settings import Settings
 
 if __name__ == "__main__":
@@ -14,16 +16,16 @@ if __name__ == "__main__":
     parser.add_argument("--metadata", default="safe")
     parser.add_argument("--memory", type=int)
     parser.add_argument("--render", default="stand_in:sketch")
-    batch.add_options(parser)
+    folders.add_options(parser)
     words = parser.parse_args()
-    recipe = batch.Recipe(
+    recipe = Recipe(
         Settings(size=64, seed=words.seed),
         metadata=words.metadata,
         max_pixels=words.max_pixels,
         max_bytes=words.max_bytes,
     )
     try:
-        sys.exit(batch.run(words.inputs, words.output, batch.options_of(words), recipe,
+        sys.exit(run(words.inputs, words.output, folders.options_of(words), recipe,
                            render=words.render, memory_limit=words.memory))  # fmt: skip
     except (ValueError, OSError) as error:
         print(f"crayonize: {error}", file=sys.stderr)

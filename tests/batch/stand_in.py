@@ -14,16 +14,16 @@ from types import SimpleNamespace
 from typing import Any
 
 from crayonize.images.icc import encode_srgb
-from crayonize.images.read import read_linear
+from crayonize.images.read import Photo
 from crayonize.settings import Settings
 from stroke_gen.drawing import Drawing
 
 
-def sketch(source: str, settings: Settings) -> tuple[Drawing, Any]:
+def sketch(source: Photo, settings: Settings) -> tuple[Drawing, Any]:
     """Stands in for api.sketch."""
-    photo = read_linear(source, min(settings.size, 64))
+    photo = source.light(min(settings.size, 64))
     rows, cols = photo.shape[:2]
-    act(Path(source))
+    act(Path(str(source.source)))
     picture = encode_srgb(photo)
     sheet = SimpleNamespace(cols=cols)
     easel = SimpleNamespace(picture_srgb=lambda light: picture, sheet=sheet, smears=True)

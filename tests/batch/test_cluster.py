@@ -13,8 +13,8 @@ import psutil
 import pytest
 from conftest import HERE, ROOT, Desk, photo
 
-from crayonize.batch import Recipe
 from crayonize.batch import cluster as cluster_module
+from crayonize.batch.job import Recipe
 from crayonize.settings import Settings
 
 pytest.importorskip("distributed")

@@ -144,7 +144,7 @@ def _join(group: Path) -> None:
 def test_a_photo_larger_than_the_memory_is_refused_before_it_is_opened(desk: Desk) -> None:
     desk.fill(2)
     Image.new("L", (6000, 5000)).save(desk.photos / "large.png")
-    run = desk.run("--memory", str(memory.need("PNG", 29_000_000, 64)))
+    run = desk.run("--memory", str(memory.need(memory.decoding("PNG", 29_000_000), 64)))
     assert run.status("large.png") == "failed" and "memory" in run.said
     assert run.count("ok") == 2
 

@@ -10,8 +10,9 @@ import pytest
 from conftest import HERE, Desk, photo
 from PIL import Image
 
-from crayonize.images.metadata import kept_of
+from crayonize.images.metadata import kept
 from crayonize.images.page import fitted
+from crayonize.images.read import open_photo
 from crayonize.settings import Settings
 
 EXIF_FOLDER, GPS_FOLDER = 0x8769, 0x8825
@@ -83,7 +84,8 @@ def test_damaged_or_endless_metadata_is_left_out(desk: Desk, memory_photo: Path)
     Image.new("RGB", (8, 8)).save(desk.photos / "long.png", exif=exif)
     run = desk.run("--metadata", "all", "--format", "jpg")
     assert run.count("ok") == 62, run.said
-    assert kept_of(desk.photos / "long.png", "all") is None
+    with open_photo(desk.photos / "long.png") as long:
+        assert kept(long.picture, "all") is None
 
 
 @pytest.mark.parametrize(
@@ -123,7 +125,9 @@ def test_help_and_planning_load_nothing_heavy(tmp_path: Path) -> None:
     photo(tmp_path / "in" / "a.png")
     code = f"""
 import sys
-from crayonize.batch import Options, Recipe, run
+from crayonize.batch.conductor import run
+from crayonize.batch.job import Recipe
+from crayonize.batch.options import Options
 from crayonize.settings import Settings
 assert run([{str(tmp_path / "in")!r}], {str(tmp_path / "out")!r}, Options(quiet=True), Recipe(Settings()),
            render="stand_in:sketch") == 0

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from conftest import Batch, Desk, photo, tree
 
-from crayonize.batch import Options, Recipe, run
+from crayonize.batch.conductor import run
+from crayonize.batch.job import Recipe
 from crayonize.batch.names import check_template, folded, picture_name
+from crayonize.batch.options import Options
 from crayonize.settings import Settings
 
 ODD_NAMES = [

@@ -10,8 +10,10 @@ import pytest
 from conftest import HERE, ROOT, Batch, photo, tree
 from s3_server import Store
 
-from crayonize.batch import Options, Recipe, remote, run
-from crayonize.batch.job import Found
+from crayonize.batch import remote
+from crayonize.batch.conductor import run
+from crayonize.batch.job import Found, Recipe
+from crayonize.batch.options import Options
 from crayonize.settings import Settings
 
 fsspec = pytest.importorskip("fsspec")

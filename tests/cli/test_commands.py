@@ -288,15 +288,14 @@ def test_any_error_is_one_line(photo, run, tmp_path, monkeypatch, error, code, w
     assert got == code and out == "" and err.count("\n") == 1 and words in err
 
 
-def test_missing_extra_has_its_own_code(photo, run, tmp_path, monkeypatch):
+def test_a_missing_extra_is_for_the_user_to_mend(photo, run, tmp_path, monkeypatch):
+    """Code 2, as for a wrong option: 3 means photos that failed, and nothing else."""
+
     def fail(*_):
-        try:
-            raise ValueError("no package") from ImportError()
-        except ValueError as error:
-            raise ValueError("install the extra") from error
+        raise ImportError('it needs more: pip install "crayonize[video]"')
 
     monkeypatch.setattr(api, "sketch", fail)
-    assert run(photo, tmp_path / "out.png")[0] == 3
+    assert run(photo, tmp_path / "out.png")[0] == 2
 
 
 def test_twice_v_shows_where(tmp_path):

@@ -19,7 +19,7 @@ from PIL import Image, ImageCms, ImageFile
 from crayonize.images import scan as image_scan
 from crayonize.images import write as image_write
 from crayonize.images.icc import decode_srgb, encode_srgb, light_from_profile
-from crayonize.images.read import measured, read_linear
+from crayonize.images.read import open_photo, read_linear
 from crayonize.images.write import file_format, read_settings, same_file, write_image
 from crayonize.machine import memory
 
@@ -196,6 +196,11 @@ def test_a_header_tells_size_and_memory(tmp_path, monkeypatch):
     cv2.imwrite(str(tmp_path / "deep.png"), deep)
     path = saved(tmp_path, noise(30, 50, 3), "a.png")
     monkeypatch.setattr(ImageFile.ImageFile, "load", lambda _: pytest.fail("decoded"))
+
+    def measured(source):
+        with open_photo(source) as photo:
+            return photo.width, photo.height, photo.decoding
+
     assert measured(path) == (50, 30, memory.decoding("PNG", 1500))
     assert measured(tmp_path / "deep.png") == (50, 30, memory.decoding("PNG", 1500, deep=True))
     assert measured(deep) == measured(Image.new("RGB", (50, 30))) == (50, 30, 0)

@@ -8,9 +8,12 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
+from crayonize.crayons.palette import load_palette
+from crayonize.crayons.used import by_crayon
+from crayonize.images.srgb import luminance
 from crayonize.svg import path as svg_path
 from crayonize.svg.load import load_svg
-from crayonize.svg.save import layers, luminance, save_svg
+from crayonize.svg.save import save_svg
 from crayonize.svg.shapes import transform
 from stroke_gen.drawing import Drawing, Stroke, Tip
 
@@ -69,7 +72,8 @@ def test_layers_are_crayons_light_to_dark(drawing, saved):
     assert [g.get(f"{inkscape}label") for g in groups] == ["1 yellow", "2 red", "3 black"]
     lightness = [luminance(g.get("stroke")) for g in groups]
     assert lightness == sorted(lightness, reverse=True)
-    assert [len(strokes) for _, strokes in layers(drawing)] == [len(g) for g in groups] == [1, 1, 2]
+    layers = by_crayon(drawing, load_palette(drawing.palette))
+    assert [len(strokes) for _, strokes in layers] == [len(g) for g in groups] == [1, 1, 2]
     assert (root.get("width"), root.get("height"), root.get("viewBox")) == ("80mm", "50mm", "0 0 80 50")
 
 
@@ -87,7 +91,7 @@ def test_file_appears_whole_or_not_at_all(drawing, tmp_path):
 def test_what_goes_out_comes_in_again(drawing, saved):
     back = load_svg(saved, palette="box8")
     assert (back.width_mm, back.height_mm) == (80, 50)
-    expected = [s for _, strokes in layers(drawing) for s in strokes]
+    expected = [s for _, strokes in by_crayon(drawing, load_palette(drawing.palette)) for s in strokes]
     for a, b in zip(expected, back.strokes, strict=True):
         assert (a.crayon, a.tip, a.note) == (b.crayon, b.tip, b.note)
         if len(a.path_mm) > 1:

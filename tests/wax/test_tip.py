@@ -81,7 +81,7 @@ def test_wear_cuts_the_profile_flat_from_below(kind, monkeypatch):
         lost = np.maximum(level - fresh[there], 0).mean()
         if kind in ("sharp", "blunt"):
             assert lost == pytest.approx(
-                min(share, 1) * (fresh[there].max() - fresh[there]).mean(), rel=0.05, abs=0.3
+                min(share, 1) * (fresh[there].max() - fresh[there]).mean(), rel=0.15, abs=0.5
             )
         flat.append((worn[there] < 1e-3).sum())
     assert flat == sorted(flat) and flat[2] > flat[0]

@@ -15,8 +15,7 @@ from crayonize.wax.deposit import deposit
 from crayonize.wax.force import balance, overlap
 from crayonize.wax.physics import THIN_UM, physics
 from crayonize.wax.sheet import Sheet
-from crayonize.wax.tip import ABSENT
-from crayonize.wax.tip import flat_um
+from crayonize.wax.tip import ABSENT, flat_um
 from crayonize.wax.tip import mask as tip_mask
 from stroke_gen.drawing import Tip
 
@@ -524,8 +523,8 @@ def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
     film = sheet.film_um()[n // 4 : -n // 4, n // 4 : -n // 4].astype(float)
     fine = film - (np.roll(film, 1, 0) + np.roll(film, -1, 0) + np.roll(film, 1, 1) + np.roll(film, -1, 1)) / 4
     fine = fine[2:-2, 2:-2]
-    assert fine.std() < 0.06 * film.mean()
-    assert (fine[1:] * fine[:-1]).mean() > -0.2 * fine.var()  # every other cell high: -.26 to -.41 if nothing yields
+    assert fine.std() < 0.075 * film.mean()
+    assert (fine[1:] * fine[:-1]).mean() > -0.265 * fine.var()  # every other cell high: -.31, -.35 if nothing yields
 
 
 def test_nothing_is_pressed_harder_than_wax_bears(bench):
@@ -624,8 +623,14 @@ def test_a_long_line_broadens_alike_as_one_stroke_and_as_many(bench):
         um = force / (bench.physics.lam * np.pi / 4 * 16)
         strokes = [bench.stroke([[a, 3], [b, 3]], um, tip=shape) for a, b in itertools.pairwise(ends)]
         bench.draw(sheet, strokes, smears=False)
-        film = sheet.film_um()[:, round((length - 12) / 0.1) : round(length / 0.1)].mean(1)
-        broad.append((film > 0.2 * film.max()).sum() * 0.1)
+        breadth = []
+        for share in (0.05, 0.6):
+            begin = round((3 + share * length) / 0.1)
+            film, across = sheet.film_um()[:, begin : begin + round(length)].mean(1), 0.1 * np.arange(60)
+            mean = (film * across).sum() / film.sum()
+            breadth.append(4 * np.sqrt((film * (across - mean) ** 2).sum() / film.sum()))
+        assert breadth[1] > 1.2 * breadth[0]
+        broad.append(breadth)
     assert broad[1] == pytest.approx(broad[0], rel=0.15)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from ..machine import cores
 from . import lock, memory
 from .cluster import Cluster
 from .crew import Crew, CrewError, Workers
@@ -28,10 +29,17 @@ def run(
     output: str,
     options: Options,
     recipe: Recipe,
-    render: str | None,
-    memory_limit: int | None,
+    *,
+    render: str | None = None,
+    memory_limit: int | None = None,
 ) -> int:
-    """What batch.run promises."""
+    """Draw all photos of folders or a list into a folder; returns the exit code.
+
+    render: "module:function" in place of `api.sketch`, for tests.   memory_limit: bytes for all workers, in
+    place of what the machine has. ValueError for what the caller can mend before anything is done, OSError if
+    the output folder cannot be used, ImportError for an extra that is missing. 0 all done, 1 stopped, 3 some
+    failed, 4 another run holds the folder, 128 + n stopped by signal n.
+    """
     fields = _fields(recipe)
     check_template(options.name, fields)
     paths = sources(inputs)
@@ -114,10 +122,10 @@ def _workers(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
     if options.dask:
         return Cluster(options.dask, recipe, render, options.time_limit)
     available = memory.available_bytes() if memory_limit is None else memory_limit
-    cores = memory.cores()
-    size = options.jobs or min(cores, memory.workers(available, recipe.settings.size))
+    count = cores.allowed()
+    size = options.jobs or min(count, memory.workers(available, recipe.settings.size))
     size = size if options.watch else max(1, min(size, jobs))
-    threads = recipe.settings.threads or max(1, cores // size)
+    threads = recipe.settings.threads or max(1, count // size)
     recipe = replace(recipe, settings=replace(recipe.settings, threads=threads))
     hello: dict[str, Any] = {"recipe": recipe.to_json(), "render": render, "memory": available}
     return Crew(size, hello, options.time_limit, available, folder.clean_up)

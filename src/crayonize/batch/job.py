@@ -3,14 +3,14 @@
 import hashlib
 import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
+from ..machine import source
+from ..machine.memory import MAX_PIXELS
 from ..settings import Settings
 
 STATUSES = ("ok", "failed", "died", "timeout", "skipped", "ignored", "not_run")
 
-MAX_PIXELS = 250_000_000
 MAX_BYTES = 1 << 30
 TIME_LIMIT = 1800.0
 
@@ -62,14 +62,14 @@ class Recipe:
     def digest(self, suffix: str) -> str:
         """A short name for all that shapes a picture: with the same photo and digest it comes out the same.
 
-        A palette, paper or style given as a file counts with its content.
+        A palette, paper or style given as a file counts with its content, and so does the program itself: after
+        an upgrade that draws otherwise, a folder is drawn anew.
         """
-        shaping = asdict(self.settings)
+        shaping = self.settings.plain()
         del shaping["threads"]
         shaping |= {"light": self.light, "metadata": self.metadata, "page": self.page, "dpi": self.dpi,
-                    "suffix": suffix}  # fmt: skip
-        by_name = (self.settings.palette, self.settings.paper, self.settings.style)
-        files = [Path(name) for name in by_name if isinstance(name, str) and Path(name).is_file()]
+                    "suffix": suffix, "version": source.of_drawings()}  # fmt: skip
+        files = self.settings.files()
         shaping["files"] = [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
         return hashlib.sha256(json.dumps(shaping, sort_keys=True).encode()).hexdigest()[:20]
 

@@ -10,7 +10,7 @@ from PIL.Image import Exif
 
 from .. import api
 from ..images import metadata, page
-from ..images.read import open_picture
+from ..images.read import Photo, open_photo
 from ..images.write import read_settings, same_file
 from ..settings import Settings
 from . import memory
@@ -31,7 +31,10 @@ class Studio:
         """render: "module:function" in place of `api.sketch`. ValueError for settings that are none."""
         self._recipe = recipe
         if render is None:
-            _check(recipe)
+            from ..wax.physics import physics
+
+            recipe.settings.parsed()
+            physics(recipe.settings.physics)
             api.workshop()
             self._sketch: Callable[..., Any] = api.sketch
         else:
@@ -66,16 +69,17 @@ class Studio:
             return self._draw(job, source, target, ask)
 
     def _draw(self, job: Job, source: str, target: Path, ask: Ask) -> Outcome:
-        settings, kept, needed = self._look_at(source)
-        if not ask(needed):
-            raise ValueError(
-                f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first"
-            )
-        if same_file(source, target):
-            raise ValueError("its picture would take its own place; choose another output folder")
-        if job.strange and not _is_ours(target):
-            raise ValueError(f"at {job.out!r} stands something that was not made here; see --existing")
-        drawing, easel = self._sketch(source, settings)
+        with open_photo(source) as photo:
+            settings, kept, needed = self._look_at(photo)
+            if not ask(needed):
+                raise ValueError(
+                    f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first"
+                )
+            if same_file(source, target):
+                raise ValueError("its picture would take its own place; choose another output folder")
+            if job.strange and not _is_ours(target):
+                raise ValueError(f"at {job.out!r} stands something that was not made here; see --existing")
+            drawing, easel = self._sketch(photo, settings)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             api.finish(drawing, easel, target, light=self._recipe.light, settings=settings, kept=kept)
@@ -85,37 +89,17 @@ class Studio:
             raise OutputError(f"{error.filename or job.out}: {error.strerror or error}") from error
         return Outcome("ok", bytes=target.stat().st_size, strokes=len(drawing.strokes))
 
-    def _look_at(self, source: str) -> tuple[Settings, Exif | None, int]:
+    def _look_at(self, photo: Photo) -> tuple[Settings, Exif | None, int]:
         """Settings for this photo, tags to keep, and bytes of memory it will take, all by its header alone.
 
         ValueError for a photo beyond the limits.
         """
-        recipe = self._recipe
-        with open_picture(source) as (picture, _):
-            width, height = picture.size
-            if width * height > recipe.max_pixels:
-                raise ValueError(
-                    f"has {width * height} pixels; the limit is {recipe.max_pixels} (--max-pixels)"
-                )
-            settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, width, height)
-            deep = ";16" in repr(getattr(picture, "tile", ""))
-            needed = memory.need(str(picture.format), width * height, settings.size, deep)
-            return settings, metadata.kept(picture, recipe.metadata), needed
-
-
-def _check(recipe: Recipe) -> None:
-    """ValueError for a palette, paper, style or force that there is not."""
-    from stroke_gen import params
-
-    from ..crayons.palette import load_palette
-    from ..wax import paper
-    from ..wax.physics import physics
-
-    settings = recipe.settings
-    load_palette(settings.palette)
-    paper.load_paper(settings.paper)
-    params.with_force(params.load_style(settings.style), settings.force)
-    physics(settings.physics)
+        recipe, pixels = self._recipe, photo.width * photo.height
+        if pixels > recipe.max_pixels:
+            raise ValueError(f"has {pixels} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
+        settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, photo.width, photo.height)
+        kept = metadata.kept(photo.picture, recipe.metadata)
+        return settings, kept, memory.need(photo.decoding, settings.size, settings.preview)
 
 
 def _is_ours(path: Path) -> bool:

@@ -16,11 +16,11 @@ from typing import Any
 
 from stroke_gen.checks import printable
 
+from ..machine.terminal import Bar, tell
 from .job import STATUSES, Job, Outcome
 
 _BAD = ("failed", "died", "timeout")
 _EVERY = 0.1  # s between two states of the bar
-_WIDTH = 20
 
 
 class ReportError(Exception):
@@ -35,26 +35,26 @@ class Report:
         self.counts = Counter(dict.fromkeys(STATUSES, 0))
         self._begun = time.monotonic()
         self._left: dict[Job, None] = {}
-        self._bar = _Bar(shown=not quiet)
+        self._pace = _Pace(shown=not quiet)
 
     def expect(self, jobs: Iterable[Job]) -> None:
         """These jobs are going to be done."""
         self._left |= dict.fromkeys(jobs)
-        self._bar.total = len(self._left)
+        self._pace.total = len(self._left)
 
     def expecting(self, jobs: Iterator[Job | None]) -> Iterator[Job | None]:
         """The same jobs, those expected that nobody knew before."""
         for job in jobs:
             if job is not None and job not in self._left:
                 self._left[job] = None
-                self._bar.total += 1
+                self._pace.total += 1
             yield job
 
     def done(self, job: Job, outcome: Outcome) -> None:
         """Tell what became of a job."""
         del self._left[job]
         self.file(job.photo.name, outcome, job.out)
-        self._bar.step(outcome.status != "ok")
+        self._pace.step(outcome.status != "ok")
 
     def not_run(self) -> None:
         """Tell of the jobs that were not done."""
@@ -91,8 +91,8 @@ class Report:
     def say(self, text: str, always: bool = True) -> None:
         """A line for people; if not `always`, not with --quiet."""
         if always or not self._quiet:
-            self._bar.clear()
-            _tell(f"crayonize: {printable(' '.join(text.split()))}\n")
+            self._pace.bar.clear()
+            tell(f"crayonize: {printable(' '.join(text.split()))}\n")
 
     def end(self, code: int, reason: str = "", elsewhere: int = 0) -> None:
         """The account of all files. reason: why the run was stopped, if it was."""
@@ -131,44 +131,28 @@ def _print(line: str) -> None:
         raise ReportError(error.strerror) from error
 
 
-def _tell(text: str) -> None:
-    """Text for people; nothing is lost if it cannot be written."""
-    if sys.stderr is not None:
-        with contextlib.suppress(OSError):
-            sys.stderr.write(text)
-            sys.stderr.flush()
-
-
-class _Bar:
-    """One line on a terminal: `[#####...............] 120 of 480 done, 2 failed, 360 left, 12 min left`."""
+class _Pace:
+    """`[#####...............] 120 of 480 done, 2 failed, 360 left, 12 min left`, now and then."""
 
     def __init__(self, shown: bool) -> None:
         self.total = 0
-        self._shown = shown and sys.stderr is not None and sys.stderr.isatty()
+        self.bar = Bar(shown)
         self._begun = self._last = time.monotonic()
-        self._length = self._done = self._failed = 0
+        self._done = self._failed = 0
 
     def step(self, failed: bool) -> None:
         """One more is done."""
         self._done += 1
         self._failed += failed
         now = time.monotonic()
-        if not self._shown or (now - self._last < _EVERY and self._done < self.total):
+        if now - self._last < _EVERY and self._done < self.total:
             return
         self._last = now
         left = self.total - self._done
-        hashes = "#" * (self._done * _WIDTH // max(1, self.total))
-        text = f"[{hashes:.<{_WIDTH}}] {self._done} of {self.total} done, {self._failed} failed, {left} left"
+        text = f"{self._done} of {self.total} done, {self._failed} failed, {left} left"
         if left:
             text += f", {_duration((now - self._begun) / self._done * left)} left"
-        _tell(f"\r{text:<{self._length}}")
-        self._length = len(text)
-
-    def clear(self) -> None:
-        """Take the line away, so that something else may be written."""
-        if self._length:
-            _tell(f"\r{' ' * self._length}\r")
-            self._length = 0
+        self.bar.show(self._done / max(1, self.total), text)
 
 
 def _duration(seconds: float) -> str:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
+from ..machine import cores
 
 if TYPE_CHECKING:
     from stroke_gen.drawing import Drawing, Stroke
@@ -82,7 +83,7 @@ def machine() -> Figures:
     import numba
     import numpy as np
 
-    return {"cpu": _cpu(), "cores": _cores(), "system": platform.platform(terse=True),
+    return {"cpu": _cpu(), "cores": cores.allowed(), "system": platform.platform(terse=True),
             "python": platform.python_version(), "numpy": np.__version__, "numba": numba.__version__,
             "cv2": cv2.__version__}  # fmt: skip
 
@@ -147,8 +148,8 @@ def threads(megapixels: float, folder: str, repeats: int) -> Figures:
     from .. import api
 
     drawing = load_drawing(Path(folder) / f"{megapixels:g}.json")
-    cores = _cores()
-    counts = [n for n in (2**i for i in range(10)) if n < cores] + [cores]
+    most = cores.allowed()
+    counts = [n for n in (2**i for i in range(10)) if n < most] + [most]
 
     def drawn(number: int) -> float:
         stand = api.workshop().easel(drawing, _sides(megapixels)[0], number)
@@ -365,10 +366,6 @@ def _sides(megapixels: float) -> tuple[int, int]:
     """Width and height in cells of a picture three to two."""
     high = round(math.sqrt(megapixels * 1e6 / 1.5))
     return round(1.5 * high), high
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _cpu() -> str:

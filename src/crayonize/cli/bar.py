@@ -1,40 +1,56 @@
-"""The progress line of the command: on a terminal only, redrawn in place, gone at the end."""
+"""What is said on stderr while the command works: a line of progress, and our own messages."""
 
+import argparse
+import os
 import sys
-from types import TracebackType
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-WIDTH = 24
+from stroke_gen.checks import printable
+
+from ..machine.terminal import Bar
+
+if TYPE_CHECKING:
+    from ..api import Progress
+    from ..pipeline import Easel
 
 
-class Bar:
-    """A progress callback that shows one line, like `shade [########........]  34 %`."""
+@contextmanager
+def talk(options: argparse.Namespace) -> Iterator["Progress"]:
+    """The progress line, and our own messages, on stderr; with -q nothing, and warnings only with -v."""
+    import logging
+    import warnings
 
-    def __init__(self, shown: bool) -> None:
-        self._shown = shown and sys.stderr.isatty()
-        self._last = ""
+    bar = Bar(shown=not options.quiet)
 
-    def __call__(self, name: str, fraction: float) -> None:
-        """Show what is being done and how much of all is done, 0 to 1."""
-        done = min(1.0, max(0.0, fraction))
-        line = f"{name[:16]:16} [{'#' * round(done * WIDTH):.<{WIDTH}}] {done:4.0%}"
-        if self._shown and line != self._last:
-            self._put(f"\r{line}")
-            self._last = line
+    def progress(name: str, share: float) -> None:
+        bar.show(share, f"{share:4.0%}", f"{name[:16]:16} ")
 
-    def clear(self) -> None:
-        """Take the line away, so that something else may be written."""
-        if self._last:
-            self._put(f"\r{' ' * len(self._last)}\r")
-            self._last = ""
+    with warnings.catch_warnings():
 
-    def _put(self, text: str) -> None:
-        sys.stderr.write(text)
-        sys.stderr.flush()
+        class Messages(logging.Handler):
+            def emit(self, record: logging.LogRecord) -> None:
+                bar.clear()
+                print(f"crayonize: {record.getMessage()}", file=sys.stderr, flush=True)
 
-    def __enter__(self) -> "Bar":
-        return self
+        log, messages = logging.getLogger("crayonize"), Messages()
+        if not options.verbose:
+            warnings.simplefilter("ignore")
+        if not options.quiet:
+            log.addHandler(messages)
+            log.setLevel(logging.INFO)
+        try:
+            yield progress
+        finally:
+            bar.clear()
+            log.removeHandler(messages)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.clear()
+
+def report(out: str | Path, easel: "Easel", strokes: int, seed: int, begun: float) -> None:
+    """What was done, for -v and where the name of the output was ours to choose."""
+    size = f"{easel.sheet.cols} x {easel.sheet.rows} pixels"
+    figures = f"{size}, {strokes} strokes, seed {seed}, {time.monotonic() - begun:.1f} s"
+    print(f"crayonize: {printable(os.fspath(out))}: {figures}", file=sys.stderr)

@@ -9,7 +9,6 @@ them anew); others are measured once and kept in the user's cache folder.
 import hashlib
 import io
 import itertools
-import os
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from stroke_gen.drawing import Stroke, Tip
 from stroke_gen.swatches import Swatches
 
 from ..light import optics
-from ..machine import folder as cache
+from ..machine import cores, folder, kernels, source
 from ..settings import Settings
 from ..wax import paper, rub
 from ..wax.box import Box
@@ -117,15 +116,18 @@ def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArr
 
 
 def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
-    """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured now."""
+    """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured now.
+
+    A kept one counts for the version of the wax that it was measured on; a shipped one is of its own version.
+    """
     name = f"{palette.name}-{_key(palette, sheet_paper, physics)}.npz"
     if (SHIPPED / name).is_file():
         return _unpacked((SHIPPED / name).read_bytes())
-    kept = cache.folder() / name
-    content = cache.read(kept)
+    kept = folder.folder() / f"{source.of_the_wax()}-{name}"
+    content = folder.read(kept)
     if content is None:
         content = _packed(measure(palette, sheet_paper, physics, threads))
-        cache.write(kept, content)
+        folder.write(kept, content)
     return _unpacked(content)
 
 
@@ -149,16 +151,17 @@ def _unpacked(content: bytes) -> Swatches:
         return Swatches(names, *(table[f].astype(np.float32) for f in ("pressures", "a", "b", "grain", "paper")))
 
 
-def ship(folder: Path = SHIPPED) -> None:
+def ship(target: Path = SHIPPED) -> None:
     """Measure the tables that the package ships: every palette on the default paper."""
-    folder.mkdir(exist_ok=True)
-    for old in folder.glob("*.npz"):
+    target.mkdir(exist_ok=True)
+    for old in target.glob("*.npz"):
         old.unlink()
     for name, *_ in palette_names():
         box, sheet_paper, physics = load_palette(name), paper.load_paper(str(Settings.paper)), Settings.physics
-        table = _packed(measure(box, sheet_paper, physics, os.cpu_count() or 1))
-        (folder / f"{name}-{_key(box, sheet_paper, physics)}.npz").write_bytes(table)
+        table = _packed(measure(box, sheet_paper, physics, cores.allowed()))
+        (target / f"{name}-{_key(box, sheet_paper, physics)}.npz").write_bytes(table)
 
 
 if __name__ == "__main__":
+    kernels.keep_kernels()
     ship()

@@ -21,13 +21,14 @@ from typing import Any
 from stroke_gen import checks, files
 from stroke_gen.checks import did_you_mean, of_kind, printable, quoted, shown
 
+from ..images.srgb import RGB, hex_of, is_hex, light_of, to_light
+
 DEFAULT_PALETTE = "box24"
 MAX_CRAYONS = 254
 MAX_FILE_BYTES = 1_000_000
 
 _DATA = Path(__file__).parents[1] / "data" / "palettes"
 _DEFAULT_FILM_UM = 15.0
-_HEX = re.compile(r"#[0-9a-fA-F]{6}")
 _MAX_NAME = 60
 
 FRONT = ((1.44 - 1) / (1.44 + 1)) ** 2  # of the light that meets wax its surface reflects (Fresnel; n of paraffin 1.44)
@@ -40,7 +41,6 @@ _PALETTE_KEYS = ("name", "title", "source", "film_um", "layer_films", "crayons")
 _COLOUR_KEYS = ("name", "hex", "hiding")
 _LAYER_KEYS = ("name", "rgb", "t", "s", "table2")
 
-RGB = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def default_hiding(colour: str) -> float:
     0.36 + 0.34 L/100 - 0.0045 C, kept within 0.12 to 0.70, with CIELab lightness L and chroma C (D65) of
     `colour` (#rrggbb): white 0.70, mid grey 0.54, pastels about 0.5, vivid red and blue under 0.2.
     """
-    lightness, chroma = _lightness_chroma(_linear_of_hex(colour))
+    lightness, chroma = _lightness_chroma(light_of(colour))
     return min(0.70, max(0.12, 0.36 + 0.34 * lightness / 100 - 0.0045 * chroma))
 
 
@@ -213,10 +213,10 @@ def _layer_crayon(data: dict[str, Any], film_um: float, layer_um: float, where: 
         raise ValueError(
             f"{where}: t + s = {t + s:g}, a layer cannot send out more light than it gets (below 1)"
         )
-    tints = [max(_DARKEST, _linear(value)) for value in colour]
+    tints = [max(_DARKEST, to_light(value)) for value in colour]
     k, sc = _per_um([(s * tint, t * tint) for tint in tints], layer_um)
     over_white = [FRONT + (1 - FRONT) * _over_white(k[c] * film_um, sc[c] * film_um) for c in range(3)]
-    return Crayon(_crayon_name(data["name"], f"{where}.name"), _hex_of_linear(over_white), k, sc)
+    return Crayon(_crayon_name(data["name"], f"{where}.name"), hex_of(over_white), k, sc)
 
 
 def _from_gimp_text(text: str, where: str, stem: str) -> Palette:
@@ -265,7 +265,7 @@ def _hex_item(text: str, where: str) -> tuple[str, str]:
     """`#rrggbb`, a name after it if any, and a comment after that (` # ...`); the first # may be left out."""
     words = text.split(" #", 1)[0].split(maxsplit=1)
     word = words[0] if words else ""
-    if not _HEX.fullmatch(word) and not _HEX.fullmatch("#" + word):
+    if not is_hex(word):
         raise ValueError(f'{where}: {quoted(word)} is not #rrggbb (a comment begins with "# ")')
     return "#" + word[-6:], words[1] if len(words) == 2 else ""
 
@@ -300,7 +300,7 @@ def _all_different(crayons: Sequence[Crayon], places: Sequence[str]) -> tuple[Cr
 
 
 def _colour(value: Any, where: str) -> str:
-    if not isinstance(value, str) or not _HEX.fullmatch(value):
+    if not isinstance(value, str) or not value.startswith("#") or not is_hex(value):
         raise ValueError(f"{where}: {shown(value)} is not #rrggbb")
     return value.lower()
 
@@ -326,7 +326,7 @@ def _colour_crayon(name: str, colour: str, hiding: float, film_um: float) -> Cra
     there thick wax of even hiding would be much darker than its hex, and heavy red brown, which it is not.
     """
     layers = []
-    for value in _linear_of_hex(colour):
+    for value in light_of(colour):
         white = min(_LIGHTEST, max(_DARKEST, (value - FRONT) / (1 - FRONT)))
         black = white * (hiding + (1 - hiding) * _CLEAN * (1 - (1 - white) ** 6) * (1 - white**2 / 2))
         layers.append((black, math.sqrt((white - black) * (1 - black))))
@@ -355,21 +355,6 @@ def _over_white(absorption: float, scattering: float) -> float:
     b = math.sqrt(a * a - 1)
     w = b / math.tanh(b * scattering)
     return (1 - a + w) / (a - 1 + w)
-
-
-def _linear(encoded: float) -> float:
-    """sRGB value to linear light, both 0..1 (IEC 61966-2-1)."""
-    return encoded / 12.92 if encoded <= 0.04045 else float(((encoded + 0.055) / 1.055) ** 2.4)
-
-
-def _linear_of_hex(colour: str) -> RGB:
-    r, g, b = (_linear(int(colour[i : i + 2], 16) / 255) for i in (1, 3, 5))
-    return r, g, b
-
-
-def _hex_of_linear(light: Sequence[float]) -> str:
-    encoded = (v * 12.92 if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in light)
-    return "#" + "".join(f"{round(255 * v):02x}" for v in encoded)
 
 
 def _lightness_chroma(light: RGB) -> tuple[float, float]:

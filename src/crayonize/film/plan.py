@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.colour import oklab
-from stroke_gen.drawing import Stroke
+from stroke_gen.drawing import Note, Stroke
 from stroke_gen.jit import kernel
 
 from ..images.icc import encode_srgb
+from ..images.srgb import codes
 from ..light import optics
 from ..wax import rub
 from ..wax.queue import TILE
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 LONG_SIDE = 900  # of a film at most, in pixels; half of it at least, if the drawing has as many
 FIRST, LAST = 0.4, 1.5  # seconds for which the bare sheet and the finished drawing stand
 FILL_MM_S, LINE_MM_S = 200.0, 60.0  # how fast a hand fills a plane, and draws a line
-LINES = ("line", "detail", "outline")  # notes of strokes that are drawn slowly
+LINES = (Note.LINE, Note.DETAIL, Note.OUTLINE)  # notes of strokes that are drawn slowly
 LIFT_S, DAB_S = 0.25, 0.1  # time from stroke to stroke, and for a dab
 LOOK = 8  # cells of a square that is looked at as a whole; squares lie within the tiles of the schedule
 SHADES = 32768  # steps of light in the table of sRGB codes
@@ -178,7 +179,7 @@ class _View:
         self.cells = max(LOOK, self.factor)  # of the side of a square
         self.side = self.cells // self.factor  # of a square, in pixels
         self.pixels_per_mm = 1 / (self.factor * sheet.cell_mm)
-        self.colours = {c.name: _rgb(c.hex) for c in easel.box.palette.crayons}
+        self.colours = {c.name: codes(c.hex) for c in easel.box.palette.crayons}
         self.light = easel.picture(shaded)
         self.codes = encode_srgb(np.linspace(0, 1, SHADES, dtype=np.float32))
         rows, cols = max(1, sheet.rows // self.factor), max(1, sheet.cols // self.factor)
@@ -356,10 +357,6 @@ def _reduce(corners, factor, light, codes, out):  # type: ignore[no-untyped-def]
 
 
 # ---- colours and the crayon in view ------------------------------------------------------------------------
-
-
-def _rgb(colour: str) -> tuple[int, int, int]:
-    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
 def _colours(easel: "Easel") -> Frame:

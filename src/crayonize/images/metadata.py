@@ -6,8 +6,6 @@ the drawing. Where the photo was taken is left out unless everything is wanted.
 
 from __future__ import annotations
 
-import os
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -29,12 +27,12 @@ _LAYOUT = frozenset(  # sizes, strips, tiles, resolution, orientation, software,
 _LONGEST = 60_000  # bytes, as JPEG holds 64 kB
 
 
-def kept(picture: Image, which: str) -> Exif | None:
+def kept(picture: Image | None, which: str) -> Exif | None:
     """The tags of an open photo that go along: none, safe (title, names, date; no place) or all of EXIF.
 
     None if there are none, or if they are too damaged or too many to be written.
     """
-    if which == "none":
+    if which == "none" or picture is None:
         return None
     from PIL.Image import Exif
 
@@ -52,15 +50,6 @@ def kept(picture: Image, which: str) -> Exif | None:
         return new if len(new) and len(new.tobytes()) <= _LONGEST else None
     except Exception:
         return None
-
-
-def kept_of(photo: str | os.PathLike[str], which: str) -> Exif | None:
-    """As `kept`, for a photo file; None too if the file is gone by now, for its drawing must not be lost with it."""
-    from .read import open_picture
-
-    with suppress(OSError, ValueError), open_picture(photo) as (picture, _):
-        return kept(picture, which)
-    return None
 
 
 def flat(exif: Exif) -> Exif:

@@ -1,8 +1,5 @@
 """Drawings for a page of paper: the largest sheet of the photo's proportions that the page holds."""
 
-import os
-from dataclasses import replace
-
 from ..settings import Settings
 
 PAGES = {  # short and long side in mm
@@ -36,16 +33,4 @@ def fitted(settings: Settings, page: str | None, dpi: float | None, width: int, 
         sheet_mm = min(long_mm, short_mm * max(width, height) / min(width, height))
         dpi = dpi or DPI
     size = settings.size if dpi is None else max(1, round(sheet_mm / _MM_PER_INCH * dpi))
-    return replace(settings, sheet_mm=sheet_mm, size=size)
-
-
-def fitted_to(
-    settings: Settings, page: str | None, dpi: float | None, photo: str | os.PathLike[str]
-) -> Settings:
-    """As `fitted`, for a photo file."""
-    if page is None and dpi is None:
-        return settings
-    from .read import open_picture
-
-    with open_picture(photo) as (picture, _):
-        return fitted(settings, page, dpi, picture.width, picture.height)
+    return settings.changed(sheet_mm=sheet_mm, size=size)

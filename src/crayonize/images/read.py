@@ -7,6 +7,7 @@ import stat
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from typing import IO, Any
 
@@ -18,6 +19,8 @@ from ..light import area
 from ..machine import memory
 from .icc import lineariser
 from .scan import Scan, check_size, damage_named, scan_array, scan_picture
+
+Source = str | os.PathLike[str] | Image.Image | NDArray[Any]
 
 FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "AVIF")
 
@@ -38,7 +41,7 @@ _pillow_limit = threading.Lock()
 
 
 def read_linear(
-    source: str | os.PathLike[str] | Image.Image | NDArray[Any],
+    source: Source,
     max_side: int | None = None,
     ground: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> NDArray[np.float32]:
@@ -52,44 +55,80 @@ def read_linear(
     ground: linear RGB behind transparent pixels.
     Returns linear RGB, float32 (h, w, 3) in [0, 1], C-contiguous, writable, ours alone.
     ValueError, one line with the name of the file, for anything that is not a whole picture within the
-    limits MAX_PIXELS and MAX_SIDE of image_scan.
+    limits MAX_PIXELS and MAX_SIDE of scan.py.
     """
+    with open_photo(source) as photo:
+        return photo.light(max_side, ground)
+
+
+@dataclass
+class Photo:
+    """A photo whose header has been read, and whose light can be taken once.
+
+    width, height: pixels as stored.   decoding: bytes that taking the light needs beside the light itself.
+    picture: its header as Pillow has it, None for an array.
+    """
+
+    source: Source
+    width: int
+    height: int
+    decoding: int
+    picture: Image.Image | None
+    _name: str
+    _scan: Callable[[], Scan]
+
+    def light(
+        self, max_side: int | None = None, ground: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ) -> NDArray[np.float32]:
+        """Decode it, as `read_linear` says; the decoded pixels are given back at the end."""
+        with _named(self._name):
+            light = _light(self._scan(), max_side, ground)
+        if self.picture is not None and not isinstance(self.source, Image.Image):
+            self.picture.close()
+        return light
+
+
+@contextmanager
+def open_photo(source: Source | Photo) -> Iterator[Photo]:
+    """Read the header of a photo: nothing is decoded before its light is asked for.
+
+    source and ValueErrors as for `read_linear`; a Photo is handed back as it is.
+    """
+    if isinstance(source, Photo):
+        yield source
+    elif isinstance(source, np.ndarray):
+        with _named("array"):
+            scan = scan_array(source)
+        yield Photo(source, scan.width, scan.height, 0, None, "array", lambda: scan)
+    elif isinstance(source, Image.Image):
+        with _named("picture"):
+            check_size(source.width, source.height)
+        yield _photo(source, source, "picture", None)
+    else:
+        with _named(shown(source)):
+            file = _opened(source)
+        with file:
+            with _named(shown(source)):
+                picture = _identify(file)
+                check_size(picture.width, picture.height)
+            yield _photo(source, picture, shown(source), file)
+
+
+def _photo(source: Source, picture: Image.Image, name: str, file: IO[bytes] | None) -> Photo:
+    deep = ";16" in repr(getattr(picture, "tile", ""))
+    decoding = memory.decoding(picture.format, picture.width * picture.height, deep)
+    return Photo(source, *picture.size, decoding, picture, name, lambda: scan_picture(picture, file))
+
+
+def _light(
+    scan: Scan, max_side: int | None, ground: tuple[float, float, float]
+) -> NDArray[np.float32]:
     if max_side is not None and max_side < 1:
         raise ValueError(f"max_side is {max_side}; it must be at least 1 pixel, or None to keep the size")
     under = np.array(ground, np.float32)
     if under.shape != (3,) or not ((under >= 0) & (under <= 1)).all():
         raise ValueError(f"ground is {ground!r}; it must be three numbers from 0 to 1 (linear RGB)")
-    if isinstance(source, np.ndarray):
-        with _named("array"):
-            return _develop(scan_array(source), max_side, under)
-    if isinstance(source, Image.Image):
-        with _named("picture"):
-            return _develop(scan_picture(source), max_side, under)
-    with open_picture(source) as (picture, file):
-        scan = scan_picture(picture, file)
-        return _develop(scan, max_side, under)
-
-
-def measured(source: str | os.PathLike[str] | Image.Image | NDArray[Any]) -> tuple[int, int, int]:
-    """Width and height of a picture as stored, and the bytes that reading it will take, by its header alone.
-
-    source and ValueErrors as for `read_linear`.
-    """
-    if isinstance(source, np.ndarray):
-        with _named("array"):
-            scan = scan_array(source)
-            return scan.width, scan.height, 0
-    if isinstance(source, Image.Image):
-        with _named("picture"):
-            return _measured(source)
-    with open_picture(source) as (picture, _):
-        return _measured(picture)
-
-
-def _measured(picture: Image.Image) -> tuple[int, int, int]:
-    check_size(picture.width, picture.height)
-    deep = ";16" in repr(getattr(picture, "tile", ""))
-    return *picture.size, memory.decoding(picture.format, picture.width * picture.height, deep)
+    return _develop(scan, max_side, under)
 
 
 @contextmanager

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageCms, UnidentifiedImageError
 
+from ..machine.memory import MAX_PIXELS
 from .icc import SRGB, Light, light_from_profile
 
-MAX_PIXELS = 250_000_000  # more is refused before decoding: 250 million pixels decode into about 1 GB
 MAX_SIDE = 1_000_000
 
 _OVERSHOOT = 0.1  # floats of an array may leave 0..1 by this much (sharpening, resampling) and are clipped

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+MAX_PIXELS = 250_000_000  # of a photo; more is refused before decoding: 250 million pixels decode into about 1 GB
 BYTES_PER_CELL = 75  # the sheet 57, its picture 3, which takes 2 (PNG) to 16 (WebP) more on its way into a file
 BYTES_PER_FILMED_CELL = 12  # the light on the sheet, which is kept while it is filmed
 OVERHEAD = 320_000_000  # the libraries, the reduced photo, the planner's work, the strokes

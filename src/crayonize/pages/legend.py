@@ -13,8 +13,8 @@ from stroke_gen.drawing import Drawing, Stroke, Tip
 
 from .. import pipeline
 from ..crayons.palette import Crayon, Palette
+from ..crayons.used import darkness
 from ..images.icc import encode_srgb
-from ..svg.save import luminance
 
 Picture = NDArray[np.uint8]  # (h, w, 3) sRGB
 
@@ -44,7 +44,7 @@ class Used:
 def used_crayons(palette: Palette, given_mm3: dict[str, float]) -> list[Used]:
     """The crayons that gave any wax, light to dark."""
     used = [Used(c, given_mm3[c.name]) for c in palette.crayons if given_mm3.get(c.name, 0.0) > 0]
-    return sorted(used, key=lambda one: -luminance(one.crayon.hex))
+    return sorted(used, key=lambda one: darkness(one.crayon))
 
 
 def with_legend(picture: Picture, drawing: Drawing, easel: pipeline.Easel, *, light: bool = True) -> Picture:
@@ -105,7 +105,7 @@ def patch(x: float, y: float, width: float, height: float, crayon: str, scale: f
     ys = np.where(top, tip_mm / 2, height - tip_mm / 2)
     path = np.stack([x + xs, y + ys], 1) * scale
     tip = Tip("blunt", float(np.clip(tip_mm * scale, 0.3, 20)))
-    force = np.full(len(path), PRESSURE * 0.785 * tip.width_mm**2, np.float32)
+    force = np.full(len(path), PRESSURE * tip.area_mm2, np.float32)
     return Stroke(path.astype(np.float32), force, crayon, tip)
 
 

@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.colour import oklab
-from stroke_gen.drawing import Drawing, Stroke, Tip
+from stroke_gen.drawing import Drawing, Note, Stroke, Tip
 from stroke_gen.files import check_target, whole_file
 
 from .. import pipeline
 from ..crayons.palette import Palette, load_palette
-from ..images.icc import decode_srgb, encode_srgb
+from ..crayons.used import by_crayon
+from ..images.icc import encode_srgb
+from ..images.srgb import light_of
 from ..images.write import write_image
-from ..svg.save import layers
 from . import legend
 from .legend import Lettering, Picture, Used
 
@@ -31,7 +32,7 @@ A4_MM = (210.0, 297.0)
 MARGIN_MM, HEAD_MM, FOOT_MM = 12.0, 26.0, 10.0
 PALE = 0.35  # how much is left of what was drawn before
 FEW = 0.01  # of all wax: crayons that give less come together at the end
-LINES = ("line", "outline")  # notes of strokes that belong to the outline
+LINES = (Note.LINE, Note.OUTLINE)  # notes of strokes that belong to the outline
 PLACE_MM = 1.5  # cells of the map of which crayon lies where
 SMALLEST_MM2 = 200.0  # a patch of colour smaller than this gets no outline
 PENCIL_TIP, PENCIL_N = Tip("sharp", 1.1), 0.55
@@ -95,10 +96,11 @@ def steps_of(drawing: Drawing) -> list[Step]:
     palette = load_palette(drawing.palette)
     if outline := outline_of(drawing, palette):
         steps.append(Step("the outline", "Draw these lines lightly.", (outline[0].crayon,), tuple(outline)))
-    amounts = {crayon.name: _amount(strokes) for crayon, strokes in layers(drawing)}
+    layers = by_crayon(drawing, palette)
+    amounts = {crayon.name: _amount(strokes) for crayon, strokes in layers}
     few = FEW * sum(amounts.values())
     last: list[tuple[str, list[Stroke]]] = []
-    for crayon, strokes in layers(drawing):
+    for crayon, strokes in layers:
         if amounts[crayon.name] < few:
             last.append((crayon.name, strokes))
         else:
@@ -123,7 +125,7 @@ def _length(stroke: Stroke) -> float:
 def _hint(strokes: Sequence[Stroke]) -> str:
     """How hard to press, and whether to fill or to draw lines."""
     lengths = np.array([_length(s) + 1 for s in strokes])
-    pressure = [float(s.force_n.mean()) / (0.785 * s.tip.width_mm**2) for s in strokes]
+    pressure = [float(s.force_n.mean()) / s.tip.area_mm2 for s in strokes]
     press = float(np.average(pressure, weights=lengths))
     how = "lightly" if press < 0.22 else "firmly" if press < 0.55 else "hard"
     lines = lengths[[s.note in LINES for s in strokes]].sum() > lengths.sum() / 2
@@ -142,13 +144,12 @@ def outline_of(drawing: Drawing, palette: Palette) -> list[Stroke]:
 
 def _grey(palette: Palette) -> str:
     """The crayon nearest to a dark grey."""
-    codes = np.array([[int(c.hex[i : i + 2], 16) for i in (1, 3, 5)] for c in palette.crayons], np.uint8)
-    lab = oklab(decode_srgb(codes[None])[0])
+    lab = oklab(np.array([light_of(c.hex) for c in palette.crayons], np.float32))
     return palette.crayons[int(((lab - (0.5, 0, 0)) ** 2).sum(1).argmin())].name
 
 
 def _pencil(path: NDArray[np.float32], crayon: str) -> Stroke:
-    return Stroke(path, np.full(len(path), PENCIL_N, np.float32), crayon, PENCIL_TIP, "line")
+    return Stroke(path, np.full(len(path), PENCIL_N, np.float32), crayon, PENCIL_TIP, Note.LINE)
 
 
 def _borders(drawing: Drawing, palette: Palette) -> Iterator[NDArray[np.float32]]:

@@ -19,6 +19,7 @@ from stroke_gen.drawing import MAX_FORCE_N, Drawing, Stroke, Tip
 
 from ..crayons.palette import Palette, load_palette
 from ..images.icc import decode_srgb
+from ..images.srgb import light_of
 from ..wax.paper import load_paper
 from . import shapes as svg_shapes
 from .elements import read_svg
@@ -95,8 +96,7 @@ class _Chooser:
 
 
 def _lab(colours: list[str]) -> NDArray[np.float32]:
-    codes = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in colours], np.uint8)
-    return oklab(decode_srgb(codes[None])[0])
+    return oklab(np.array([light_of(colour) for colour in colours], np.float32))
 
 
 def _lab_of(colour: RGB) -> NDArray[np.float32]:
@@ -200,7 +200,7 @@ def _dot(line: Floats, width: float) -> Floats:
 
 
 def _force(tip: Tip) -> float:
-    return PRESSURE * 0.785 * tip.width_mm**2
+    return PRESSURE * tip.area_mm2
 
 
 def _kind(shape: Shape, width: float) -> str:

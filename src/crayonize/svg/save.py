@@ -16,45 +16,30 @@ from numpy.typing import NDArray
 from stroke_gen.drawing import Drawing, Stroke, check_drawing
 from stroke_gen.files import whole_file
 
-from ..crayons.palette import Crayon, load_palette
-from ..images.icc import decode_srgb
+from ..crayons.palette import Palette, load_palette
+from ..crayons.used import by_crayon
 
 DAB_MM = 0.01  # a point is drawn as a line this long: plotters and viewers drop lines of no length
 
 
-def save_svg(drawing: Drawing, path: str | os.PathLike[str]) -> None:
+def save_svg(drawing: Drawing, path: str | os.PathLike[str], palette: Palette | None = None) -> None:
     """Write the strokes of a drawing as SVG; the same drawing always gives the same bytes.
 
+    palette: that of the drawing, where it has been read already.
     The file appears whole or not at all. ValueError if the drawing breaks a rule, OSError naming `path`.
     """
     check_drawing(drawing, "drawing")
     with whole_file(path) as part, open(part, "x", encoding="utf-8", newline="\n") as file:
-        file.writelines(_lines(drawing))
+        file.writelines(_lines(drawing, palette or load_palette(drawing.palette)))
 
 
-def layers(drawing: Drawing) -> list[tuple[Crayon, list[Stroke]]]:
-    """The crayons that are used, light to dark, each with its strokes in drawing order."""
-    palette = load_palette(drawing.palette)
-    strokes: dict[int, list[Stroke]] = {}
-    for stroke in drawing.strokes:
-        strokes.setdefault(palette.index(stroke.crayon), []).append(stroke)
-    used = [(palette.crayons[i], strokes[i]) for i in sorted(strokes)]
-    return sorted(used, key=lambda layer: -luminance(layer[0].hex))
-
-
-def luminance(colour: str) -> float:
-    """Relative luminance of #rrggbb, 0 black to 1 white (IEC 61966-2-1)."""
-    code = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], np.uint8)
-    return float(decode_srgb(code.reshape(1, 1, 3))[0, 0] @ (0.2126, 0.7152, 0.0722))
-
-
-def _lines(drawing: Drawing) -> Iterator[str]:
+def _lines(drawing: Drawing, palette: Palette) -> Iterator[str]:
     width, height = f"{drawing.width_mm:.7g}", f"{drawing.height_mm:.7g}"
     yield '<?xml version="1.0" encoding="UTF-8"?>\n'
     yield ('<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
            f'version="1.1" width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}" '
            'fill="none" stroke-linecap="round" stroke-linejoin="round">\n')  # fmt: skip
-    for number, (crayon, strokes) in enumerate(layers(drawing), 1):
+    for number, (crayon, strokes) in enumerate(by_crayon(drawing, palette), 1):
         label = quoteattr(f"{number} {crayon.name}")
         yield (f'<g inkscape:groupmode="layer" id="layer{number}" inkscape:label={label} stroke="{crayon.hex}" '
                f"data-crayon={quoteattr(crayon.name)}>\n")  # fmt: skip

@@ -6,7 +6,6 @@ patch is made by convolution in the frequency domain and laid side by side over 
 
 import functools
 import os
-import re
 import tomllib
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
@@ -17,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.checks import did_you_mean
+
+from ..images.srgb import light_of
 
 Floats = NDArray[np.float32]
 
@@ -88,12 +89,10 @@ def _checked(paper: Paper) -> Paper:
 
 def colour_linear(colour: str) -> tuple[float, float, float]:
     """Linear RGB of '#rrggbb'."""
-    if not re.fullmatch("#?[0-9a-fA-F]{6}", colour):
-        raise ValueError(f"colour: {colour!r} is not #rrggbb")
-    digits = colour.removeprefix("#")
-    code = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in code)
-    return r, g, b
+    try:
+        return light_of(colour)
+    except ValueError as error:
+        raise ValueError(f"colour: {error}") from error
 
 
 def tooth(paper: Paper, rows: int, cols: int, cell_mm: float, seed: int) -> Floats:
@@ -144,16 +143,9 @@ def _convolve(noise: Floats, spot: Floats) -> Floats:
 
 
 def _lunar(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> Floats:
-    """The lunar texture: uniform noise convolved with a quarter-circle arc, four ways up for isotropy."""
+    """The lunar texture: uniform noise convolved with one quarter-circle arc (Fig. 1, left)."""
     spot = _arc(radius=2.2 * wavelength, width=max(0.55 * wavelength, 1.0))
-
-    def turned(noise: Floats, turn: int) -> Floats:
-        noise -= np.float32(0.5)
-        return _convolve(noise, np.rot90(spot, turn))
-
-    with ThreadPoolExecutor() as pool:  # convolves one lattice while the next is filled
-        turns = [pool.submit(turned, rng.random(shape, np.float32), turn) for turn in range(4)]
-    return _sum(turns)
+    return _convolve(rng.random(shape, np.float32) - np.float32(0.5), spot)
 
 
 def _arc(radius: float, width: float) -> Floats:

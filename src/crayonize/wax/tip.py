@@ -7,6 +7,7 @@ long streaks along a stroke.
 """
 
 import functools
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
