@@ -1,6 +1,8 @@
-"""Draws the gallery: each photo of samples/photos in four styles, side by side, and the README's first picture.
+"""Draws the gallery: each photo of samples/photos in four styles, side by side, and the README's
+first picture.
 
-usage: python samples/gallery.py [NAME ...]        one strip a photo goes to samples/gallery/NAME.jpg
+usage: python samples/gallery.py [NAME ...]        one strip a photo goes to
+samples/gallery/NAME.jpg
 """
 
 import sys
@@ -21,7 +23,10 @@ QUALITY = 84
 def beside(pictures: list[Image.Image], height: int) -> Image.Image:
     """Pictures scaled to one height, side by side on white."""
     sizes = [(round(p.width * height / p.height), height) for p in pictures]
-    scaled = [p.convert("RGB").resize(s, Image.Resampling.LANCZOS) for p, s in zip(pictures, sizes, strict=True)]
+    scaled = [
+        p.convert("RGB").resize(s, Image.Resampling.LANCZOS)
+        for p, s in zip(pictures, sizes, strict=True)
+    ]
     gap = np.full((height, 8, 3), 255, np.uint8)
     row = [part for picture in scaled for part in (np.asarray(picture), gap)][:-1]
     return Image.fromarray(np.hstack(row))
@@ -38,7 +43,9 @@ def main(names: list[str]) -> None:
         beside([photo, *drawings], STRIP_PX).save(target, quality=QUALITY)
         print(target)
         if path.stem == FIRST:
-            beside([photo, drawings[0]], FIRST_PX).save(HERE / "gallery" / "first.jpg", quality=QUALITY)
+            beside([photo, drawings[0]], FIRST_PX).save(
+                HERE / "gallery" / "first.jpg", quality=QUALITY
+            )
 
 
 if __name__ == "__main__":

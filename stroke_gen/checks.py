@@ -1,6 +1,8 @@
-"""Checks of what people and files give us: each returns the value, or raises a ValueError of one line.
+"""Checks of what people and files give us: each returns the value, or raises a ValueError of one
+line.
 
-`where` begins the line: the file, the place in it and the field, as in `box.json: crayons[2].hiding`.
+`where` begins the line: the file, the place in it and the field, as in `box.json:
+crayons[2].hiding`.
 No numpy here: the command line checks its words without waiting for it.
 """
 
@@ -24,9 +26,7 @@ def number(value: Any, low: float, high: float, where: str, unit: str = "") -> f
     """
     if not is_number(value) or not low <= value <= high:
         unit = unit and f" {unit}"
-        raise ValueError(
-            f"{where}: {shown(value)} is not a number from {low:g} to {high:g}{unit}"
-        )
+        raise ValueError(f"{where}: {shown(value)} is not a number from {low:g} to {high:g}{unit}")
     return float(value)
 
 
@@ -77,7 +77,7 @@ def count(what: str, number_of: int, most: int, where: str) -> None:
         raise ValueError(f"{where}: {number_of:,} {what}, at most {most:,} are taken")
 
 
-# ---- JSON --------------------------------------------------------------------------------------
+# ---- JSON ----------------------------------------------------------------------------------------
 
 
 class _RepeatedKey(ValueError):
@@ -113,7 +113,7 @@ def parsed_json(
         raise ValueError(f"{where}: a whole number with thousands of digits") from error
 
 
-# ---- words of a message ------------------------------------------------------------------------
+# ---- words of a message --------------------------------------------------------------------------
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

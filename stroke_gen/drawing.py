@@ -1,8 +1,9 @@
 """Drawing: every stroke of a crayon drawing in drawing order, and the limits it keeps to.
 
-This is the seam of the program: strokes are planned on one side and rubbed onto paper on the other, and a
-Drawing can be saved, loaded, written by hand or made by another program in between (drawing_file.py). All
-geometry is in millimetres on the sheet, x to the right, y down; all forces are in newton.
+This is the seam of the program: strokes are planned on one side and rubbed onto paper on the other,
+and a Drawing can be saved, loaded, written by hand or made by another program in between
+(drawing_file.py). All geometry is in millimetres on the sheet, x to the right, y down; all forces
+are in newton.
 """
 
 import json
@@ -52,7 +53,8 @@ class Tip:
 
     @property
     def area_mm2(self) -> float:
-        """Area of paper under the tip: a disc, but for "side" a strip and for "rim" one side of a ring.
+        """Area of paper under the tip: a disc, but for "side" a strip and for "rim" one side of a
+        ring.
 
         >>> round(Tip("side", 30.0).area_mm2, 1)
         78.0
@@ -77,7 +79,8 @@ RIM_SHARE = (_beyond(1.0, RIM_FROM) - _beyond(RIM_INNER, RIM_FROM)) / math.pi  #
 class Stroke:
     """One movement of one crayon over the paper; a single point is a dab.
 
-    path_mm: (n, 2) float32, x and y.   force_n: (n,) float32, how hard the crayon is pressed at each point.
+    path_mm: (n, 2) float32, x and y.   force_n: (n,) float32, how hard the crayon is pressed at
+        each point.
     crayon: its name in the palette.   note: what the stroke is for, one of Note or any word.
     """
 
@@ -92,7 +95,8 @@ class Stroke:
 class Drawing:
     """A sheet of paper and the strokes on it, first stroke first.
 
-    paper, palette: the name of one, or its content as a JSON object.   physics: the units of the wax model.
+    paper, palette: the name of one, or its content as a JSON object.   physics: the units of the
+        wax model.
     seed: what the paper and every chance in the wax are drawn from.
     """
 
@@ -105,11 +109,13 @@ class Drawing:
     seed: int = 0
 
 
-# ---- the limits ----------------------------------------------------------------------------------------------
+# ---- the limits ----------------------------------------------------------------------------------
 
 
 def check_drawing(drawing: Drawing, where: str) -> None:
-    """ValueError naming the field, and the stroke counted from 1, that breaks a limit of drawings."""
+    """ValueError naming the field, and the stroke counted from 1, that breaks a limit of
+    drawings.
+    """
     width, height = (checks.number(side, 1.0, MAX_SHEET_MM, f"{where}: sheet_mm", "mm")
                      for side in (drawing.width_mm, drawing.height_mm))  # fmt: skip
     _check_named(drawing.paper, f"{where}: paper")
@@ -117,7 +123,9 @@ def check_drawing(drawing: Drawing, where: str) -> None:
     _check_label(drawing.physics, f"{where}: physics")
     checks.whole(drawing.seed, 0, MAX_SEED, f"{where}: seed", "2^63 - 1")
     checks.count("strokes", len(drawing.strokes), MAX_STROKES, where)
-    checks.count("points", sum(len(stroke.path_mm) for stroke in drawing.strokes), MAX_POINTS, where)
+    checks.count(
+        "points", sum(len(stroke.path_mm) for stroke in drawing.strokes), MAX_POINTS, where
+    )
     for i, stroke in enumerate(drawing.strokes):
         _check_stroke(stroke, width, height, f"{where}: stroke {i + 1}")
 
@@ -138,20 +146,32 @@ def _check_stroke(stroke: Stroke, width_mm: float, height_mm: float, where: str)
     check_tip(stroke.tip, f"{where}: tip")
     path, force = stroke.path_mm, stroke.force_n
     if path.ndim != 2 or path.shape[1] != 2 or len(path) == 0 or force.shape != (len(path),):
-        raise ValueError(f"{where}: path {path.shape} and force {force.shape} are not of shapes (n, 2) and (n,)")
+        raise ValueError(
+            f"{where}: path {path.shape} and force {force.shape} are not of shapes (n, 2) and (n,)"
+        )
     for axis, size in enumerate((width_mm, height_mm)):
-        _check_range(path[:, axis], -size, 2 * size, 0.002, f"{where}: path", f"{'xy'[axis]} =", "mm")
+        _check_range(
+            path[:, axis], -size, 2 * size, 0.002, f"{where}: path", f"{'xy'[axis]} =", "mm"
+        )
     _check_range(force, 0.0, MAX_FORCE_N, 0.0, f"{where}: force", "force =", "N")
 
 
 def _check_range(
-    values: NDArray[np.float32], low: float, high: float, slack: float, where: str, what: str, unit: str
+    values: NDArray[np.float32],
+    low: float,
+    high: float,
+    slack: float,
+    where: str,
+    what: str,
+    unit: str,
 ) -> None:
     """slack: what rounding the sheet and the point to thousandths may add."""
     if low - slack <= values.min() and values.max() <= high + slack:
         return
     i = int(np.argmin((values >= low - slack) & (values <= high + slack)))
-    raise ValueError(f"{where}: point {i + 1}: {what} {values[i]:g} is not from {low:g} to {high:g} {unit}")
+    raise ValueError(
+        f"{where}: point {i + 1}: {what} {values[i]:g} is not from {low:g} to {high:g} {unit}"
+    )
 
 
 def _check_named(value: Any, where: str) -> None:

@@ -1,4 +1,5 @@
-"""The JSON file of a Drawing: read with every error named, written so that the same drawing gives the same bytes.
+"""The JSON file of a Drawing: read with every error named, written so that the same drawing gives
+the same bytes.
 
 The file holds one stroke a line:
 
@@ -7,11 +8,13 @@ The file holds one stroke a line:
      "tip": {"kind": "blunt", "width_mm": 2.4}, "force": 1.5,
      "strokes": [
        {"crayon": "red", "path": [[10, 10], [40, 12.5]]},
-       {"crayon": "blue", "path": [[5, 5, 0.8], [9, 5, 2.1]], "tip": {"kind": "sharp"}, "note": "line"}]}
+       {"crayon": "blue", "path": [[5, 5, 0.8], [9, 5, 2.1]], "tip": {"kind": "sharp"}, "note":
+       "line"}]}
 
-`tip` and `force` at the top are what strokes without their own get. A stroke's force is one number or one for
-each point; a third number in a point is the force there and wins. physics, seed, tip, force and note may be
-left out. Whether paper, palette and crayons exist is for the program that draws to say.
+`tip` and `force` at the top are what strokes without their own get. A stroke's force is one number
+or one for each point; a third number in a point is the force there and wins. physics, seed, tip,
+force and note may be left out. Whether paper, palette and crayons exist is for the program that
+draws to say.
 """
 
 import contextlib
@@ -28,7 +31,17 @@ from numpy.typing import NDArray
 
 from . import checks
 from .checks import is_number, of_kind, printable, shown
-from .drawing import MAX_FORCE_N, MAX_SHEET_MM, MAX_STROKES, Drawing, Note, Stroke, Tip, check_drawing, check_tip
+from .drawing import (
+    MAX_FORCE_N,
+    MAX_SHEET_MM,
+    MAX_STROKES,
+    Drawing,
+    Note,
+    Stroke,
+    Tip,
+    check_drawing,
+    check_tip,
+)
 from .files import whole_file
 
 FORMAT = "crayonize drawing"
@@ -36,8 +49,18 @@ VERSION = 1
 DEFAULT_FORCE_N = 1.5
 MAX_CHARS = 1_500_000_000  # 50 million points, each with a force, at full length
 
-_DRAWING_KEYS = ("format", "version", "sheet_mm", "paper", "palette", "physics", "seed", "tip", "force",
-                 "strokes")  # fmt: skip
+_DRAWING_KEYS = (
+    "format",
+    "version",
+    "sheet_mm",
+    "paper",
+    "palette",
+    "physics",
+    "seed",
+    "tip",
+    "force",
+    "strokes",
+)
 _STROKE_KEYS = ("crayon", "path", "force", "tip", "note")
 _TIP_KEYS = ("kind", "width_mm", "angle_deg")
 _CHUNK = 2**20
@@ -45,7 +68,7 @@ _DECIMALS = 3  # a micrometre, a thousandth of a newton
 _NO_FORCE = -math.inf  # stands where a point among [x, y, force] points has no force of its own
 
 
-# ---- reading ---------------------------------------------------------------------------------------------
+# ---- reading -------------------------------------------------------------------------------------
 
 
 def load_drawing(source: str | os.PathLike[str] | TextIO) -> Drawing:
@@ -77,7 +100,9 @@ def _read(stream: TextIO, where: str) -> Drawing:
 
 
 def _packed(made: dict[str, Any]) -> dict[str, Any]:
-    """A JSON object, its path already an array if it is sound: as lists it takes ten times the memory."""
+    """A JSON object, its path already an array if it is sound: as lists it takes ten times the
+    memory.
+    """
     if "path" in made:
         with contextlib.suppress(ValueError):
             made["path"] = _points(made["path"], "")
@@ -87,7 +112,8 @@ def _packed(made: dict[str, Any]) -> dict[str, Any]:
 def drawing_from_json(obj: Any, where: str = "drawing") -> Drawing:
     """The drawing a parsed JSON object describes.
 
-    where: what every error message begins with, such as the file name. ValueError as in load_drawing.
+    where: what every error message begins with, such as the file name. ValueError as in
+        load_drawing.
     """
     _object(obj, _DRAWING_KEYS, where)
     for key in ("format", "version", "sheet_mm", "paper", "palette", "strokes"):
@@ -96,11 +122,21 @@ def drawing_from_json(obj: Any, where: str = "drawing") -> Drawing:
     if obj["format"] != FORMAT:
         raise ValueError(f'{where}: format: {shown(obj["format"])} is not "{FORMAT}"')
     if obj["version"] != VERSION or isinstance(obj["version"], bool):
-        raise ValueError(f"{where}: version: {shown(obj['version'])} is not {VERSION}, the one this program reads")
-    given = of_kind(list, obj["strokes"], f"{where}: strokes", 'a list like [{"crayon": "red", "path": [[1, 2]]}]')
+        raise ValueError(
+            f"{where}: version: {shown(obj['version'])} is not {VERSION}, the one this program "
+            "reads"
+        )
+    given = of_kind(
+        list,
+        obj["strokes"],
+        f"{where}: strokes",
+        'a list like [{"crayon": "red", "path": [[1, 2]]}]',
+    )
     checks.count("strokes", len(given), MAX_STROKES, where)
     tip = _tip(obj.get("tip", {}), Tip(), f"{where}: tip")
-    force = checks.number(obj.get("force", DEFAULT_FORCE_N), 0.0, MAX_FORCE_N, f"{where}: force", "N")
+    force = checks.number(
+        obj.get("force", DEFAULT_FORCE_N), 0.0, MAX_FORCE_N, f"{where}: force", "N"
+    )
     width_mm, height_mm = _sheet(obj["sheet_mm"], where)
     strokes = [_stroke(one, tip, force, _place(where, i, one)) for i, one in enumerate(given)]
     drawing = Drawing(
@@ -122,7 +158,9 @@ def _object(value: Any, valid: tuple[str, ...], where: str) -> None:
 
 def _place(where: str, index: int, stroke: Any) -> str:
     crayon = stroke.get("crayon") if isinstance(stroke, dict) else None
-    return f"{where}: stroke {index + 1}" + (f" ({shown(crayon)[1:-1]})" if isinstance(crayon, str) else "")
+    return f"{where}: stroke {index + 1}" + (
+        f" ({shown(crayon)[1:-1]})" if isinstance(crayon, str) else ""
+    )
 
 
 def _sheet(value: Any, where: str) -> tuple[float, float]:
@@ -155,10 +193,14 @@ def _points(value: Any, where: str) -> NDArray[np.float64]:
     if isinstance(value, np.ndarray):
         return value
     if not isinstance(value, list) or not value:
-        raise ValueError(f"{where}: {shown(value)} is not a list of points like [[10, 20], [30, 20]]")
+        raise ValueError(
+            f"{where}: {shown(value)} is not a list of points like [[10, 20], [30, 20]]"
+        )
     lengths = set(map(len, value)) if set(map(type, value)) == {list} else set()
     if not lengths or not lengths <= {2, 3}:
-        i, bad = next((i, p) for i, p in enumerate(value) if not isinstance(p, list) or len(p) not in (2, 3))
+        i, bad = next(
+            (i, p) for i, p in enumerate(value) if not isinstance(p, list) or len(p) not in (2, 3)
+        )
         raise ValueError(f"{where}: point {i + 1}: {shown(bad)} is not [x, y] or [x, y, force]")
     flat = _float64(list(chain.from_iterable(value)))
     if flat is None:
@@ -173,7 +215,10 @@ def _forces(value: Any, count: int, where: str) -> NDArray[np.float64]:
     if not isinstance(value, list):
         return np.full(count, checks.number(value, 0.0, MAX_FORCE_N, where, "N"))
     if len(value) != count:
-        raise ValueError(f"{where}: {len(value)} numbers for {count} points, give one number or one for each point")
+        raise ValueError(
+            f"{where}: {len(value)} numbers for {count} points, give one number or one for each "
+            "point"
+        )
     forces = _float64(value)
     if forces is None:
         bad = next(v for v in value if not is_number(v))
@@ -208,7 +253,7 @@ def _tip(data: Any, default: Tip, where: str) -> Tip:
     return Tip(tip.kind, float(tip.width_mm), float(tip.angle_deg))
 
 
-# ---- writing ---------------------------------------------------------------------------------------------
+# ---- writing -------------------------------------------------------------------------------------
 
 
 def drawing_to_json(drawing: Drawing) -> dict[str, Any]:
@@ -218,14 +263,17 @@ def drawing_to_json(drawing: Drawing) -> dict[str, Any]:
     """
     check_drawing(drawing, "drawing")
     tip = _usual_tip(drawing)
-    return {**_header(drawing, tip), "strokes": [_stroke_object(stroke, tip) for stroke in drawing.strokes]}
+    return {
+        **_header(drawing, tip),
+        "strokes": [_stroke_object(stroke, tip) for stroke in drawing.strokes],
+    }
 
 
 def save_drawing(drawing: Drawing, path: str | os.PathLike[str]) -> None:
     """Write the drawing, one stroke a line; the same drawing always gives the same bytes.
 
-    The file appears whole or not at all. ValueError if the drawing breaks a rule of the file, OSError naming
-    `path` if it cannot be written.
+    The file appears whole or not at all. ValueError if the drawing breaks a rule of the file,
+    OSError naming `path` if it cannot be written.
     """
     check_drawing(drawing, "drawing")
     with whole_file(path) as part, open(part, "x", encoding="ascii", newline="\n") as file:
@@ -234,7 +282,9 @@ def save_drawing(drawing: Drawing, path: str | os.PathLike[str]) -> None:
 
 def _lines(drawing: Drawing) -> Iterator[str]:
     tip = _usual_tip(drawing)
-    header = ",\n".join(f"{_dumped(key)}: {_dumped(value)}" for key, value in _header(drawing, tip).items())
+    header = ",\n".join(
+        f"{_dumped(key)}: {_dumped(value)}" for key, value in _header(drawing, tip).items()
+    )
     yield f'{{{header},\n"strokes": ['
     for i, stroke in enumerate(drawing.strokes):
         yield (",\n" if i else "\n") + _stroke_line(stroke, tip)
@@ -261,7 +311,11 @@ def _header(drawing: Drawing, tip: Tip) -> dict[str, Any]:
 
 
 def _tip_object(tip: Tip) -> dict[str, Any]:
-    return {"kind": tip.kind, "width_mm": _rounded(tip.width_mm), "angle_deg": _rounded(tip.angle_deg)}
+    return {
+        "kind": tip.kind,
+        "width_mm": _rounded(tip.width_mm),
+        "angle_deg": _rounded(tip.angle_deg),
+    }
 
 
 def _stroke_object(stroke: Stroke, usual_tip: Tip) -> dict[str, Any]:
@@ -274,7 +328,10 @@ def _stroke_object(stroke: Stroke, usual_tip: Tip) -> dict[str, Any]:
 
 
 def _stroke_line(stroke: Stroke, usual_tip: Tip) -> str:
-    """The stroke object as text. %.7g writes thousandths up to 9999.999 exactly, in half the time of json."""
+    """The stroke object as text.
+
+    %.7g writes thousandths up to 9999.999 exactly, in half the time of json.
+    """
     forces = _thousandths(stroke.force_n)
     force = f"{forces[0]:.7g}"
     if (forces != forces[0]).any():

@@ -1,4 +1,6 @@
-"""Files in and out: read within limits, and written so that a name stands for a whole file or none."""
+"""Files in and out: read within limits, and written so that a name stands for a whole file or
+none.
+"""
 
 import errno
 import os
@@ -13,12 +15,14 @@ PART = ".crayonize-"  # begins the name of a file that is not yet whole; the pro
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str], durable: bool = True) -> Iterator[Path]:
-    """A path in the same folder and with the same suffix to write to; it takes the name `path` at the end.
+    """A path in the same folder and with the same suffix to write to; it takes the name `path` at
+    the end.
 
-    After any fault the old file stands and nothing else is left; a link is replaced, never written through.
-    durable: file and name are on the disk before this ends, so that no loss of power takes them back.
-    ValueError if the folder does not exist or `path` stands for a folder or device, OSError naming `path` if
-    the disk refuses.
+    After any fault the old file stands and nothing else is left; a link is replaced, never written
+    through.
+    durable: file and name are on the disk before this ends, so that no loss of power takes them
+    back. ValueError if the folder does not exist or `path` stands for a folder or device, OSError
+    naming `path` if the disk refuses.
     """
     target = Path(os.fsdecode(path))
     check_target(target)
@@ -40,7 +44,9 @@ def whole_file(path: str | os.PathLike[str], durable: bool = True) -> Iterator[P
 
 
 def _sync(path: Path, flags: int) -> None:
-    """Have a file, or the names in a folder, on the disk; some network disks know no such thing for folders."""
+    """Have a file, or the names in a folder, on the disk; some network disks know no such thing for
+    folders.
+    """
     handle = os.open(path, flags)
     try:
         os.fsync(handle)
@@ -52,20 +58,28 @@ def _sync(path: Path, flags: int) -> None:
 
 
 def check_target(path: str | os.PathLike[str]) -> None:
-    """Refuse, before any work is done, what os.replace would fail on or destroy: folders, devices, pipes."""
+    """Refuse, before any work is done, what os.replace would fail on or destroy: folders, devices,
+    pipes.
+    """
     target = Path(os.fsdecode(path))
     if not target.parent.is_dir():
-        raise ValueError(f"{str(target)!r}: the folder {str(target.parent)!r} does not exist; create it first")
+        raise ValueError(
+            f"{str(target)!r}: the folder {str(target.parent)!r} does not exist; create it first"
+        )
     if os.path.lexists(target):
         mode = os.lstat(target).st_mode
         if not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
-            raise ValueError(f"{str(target)!r}: stands for a folder or device; give the name of a file")
+            raise ValueError(
+                f"{str(target)!r}: stands for a folder or device; give the name of a file"
+            )
 
 
 def read_bytes(path: str | os.PathLike[str], most: int, what: str) -> bytes:
-    """All of an ordinary file of at most `most` bytes; a pipe or device is refused before it can block.
+    """All of an ordinary file of at most `most` bytes; a pipe or device is refused before it can
+    block.
 
-    ValueError, without the name before it, for anything else. what: the kind of file, for the message.
+    ValueError, without the name before it, for anything else. what: the kind of file, for the
+        message.
     """
     if "\0" in os.fsdecode(path):
         raise ValueError("cannot be read (a null byte in the name)")

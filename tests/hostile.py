@@ -1,7 +1,8 @@
-"""Bad, odd and misnamed picture files, the same ones each time: what a folder of photos may turn out to hold.
+"""Bad, odd and misnamed picture files, the same ones each time: what a folder of photos may turn
+out to hold.
 
-`bad_files` gives name -> (content, what must become of it); `mutations` damages good files at random. All are
-made here from a seed, none is taken from elsewhere.
+`bad_files` gives name -> (content, what must become of it); `mutations` damages good files at
+random. All are made here from a seed, none is taken from elsewhere.
 """
 
 import io
@@ -77,7 +78,9 @@ def mutations(number: int, seed: int = 1) -> Iterator[tuple[str, bytes]]:
         yield f"{i:06}-{kind}-{name}", _damaged(bytearray(content), kind, chance, goods)
 
 
-def _damaged(data: bytearray, kind: str, chance: random.Random, goods: list[tuple[str, bytes]]) -> bytes:
+def _damaged(
+    data: bytearray, kind: str, chance: random.Random, goods: list[tuple[str, bytes]]
+) -> bytes:
     at = chance.randrange(len(data))
     match kind:
         case "cut":
@@ -98,7 +101,7 @@ def _damaged(data: bytearray, kind: str, chance: random.Random, goods: list[tupl
     return bytes(data)
 
 
-# ---- the groups ------------------------------------------------------------------------------------------
+# ---- the groups ----------------------------------------------------------------------------------
 
 
 def _impostors() -> Files:
@@ -184,9 +187,15 @@ def _png_lies() -> Files:
         "png-wider.png": (_png(4000, 4000, rows), FAILED),
         "png-depth-3.png": (_png(10, 10, rows, b"\x03\x02\x00\x00\x00"), FAILED),
         "png-colour-9.png": (_png(10, 10, rows, b"\x08\x09\x00\x00\x00"), FAILED),
-        "png-filter-9.png": (_png(10, 10, zlib.compress(b"\x09" + bytes(30) + bytes(31 * 9))), EITHER),
+        "png-filter-9.png": (
+            _png(10, 10, zlib.compress(b"\x09" + bytes(30) + bytes(31 * 9))),
+            EITHER,
+        ),
         "png-no-data.png": (good[: at - 4] + good[-12:], FAILED),
-        "png-no-palette.png": (_png(10, 10, zlib.compress(bytes(110)), b"\x08\x03\x00\x00\x00"), EITHER),
+        "png-no-palette.png": (
+            _png(10, 10, zlib.compress(bytes(110)), b"\x08\x03\x00\x00\x00"),
+            EITHER,
+        ),
         "png-not-packed.png": (_png(10, 10, bytes(300)), FAILED),
         "png-short-chunk.png": (good[: at - 4] + struct.pack(">I", 0x7FFFFFF0) + good[at:], EITHER),
         "png-text-bomb.png": (_png(10, 10, rows, more=_chunk(b"zTXt", b"a\0\0" + bomb)), EITHER),
@@ -262,9 +271,17 @@ def _tiff_lies() -> Files:
     """TIFF files whose directory lies."""
 
     def tiff(changes: dict[int, tuple[int, int, int]], next_: int = 0) -> bytes:
-        tags = {256: (4, 1, 8), 257: (4, 1, 8), 258: (3, 1, 8), 259: (3, 1, 1), 262: (3, 1, 1), 273: (4,
-        1, 8),
-                277: (3, 1, 1), 278: (4, 1, 8), 279: (4, 1, 64)} | changes  # fmt: skip
+        tags = {
+            256: (4, 1, 8),
+            257: (4, 1, 8),
+            258: (3, 1, 8),
+            259: (3, 1, 1),
+            262: (3, 1, 1),
+            273: (4, 1, 8),
+            277: (3, 1, 1),
+            278: (4, 1, 8),
+            279: (4, 1, 64),
+        } | changes
         rows = b"".join(struct.pack("<HHII", tag, *value) for tag, value in sorted(tags.items()))
         return (
             b"II*\0"
@@ -291,7 +308,9 @@ def _tiff_lies() -> Files:
         "colours-99": ({262: (3, 1, 99)}, FAILED),
         "type-99": ({256: (99, 1, 8)}, FAILED),
     }
-    files = {f"tiff-{name}.tif": (tiff(changes), verdict) for name, (changes, verdict) in lies.items()}
+    files = {
+        f"tiff-{name}.tif": (tiff(changes), verdict) for name, (changes, verdict) in lies.items()
+    }
     return files | {
         "tiff-in-a-circle.tif": (tiff({}, next_=72), OK),
         "tiff-no-directory.tif": (b"II*\0\xff\xff\xff\xff", FAILED),
@@ -313,7 +332,9 @@ def _odd_but_whole() -> Files:
         "la.png": saved(noise("LA"), "PNG"),
         "rgba.webp": saved(noise("RGBA"), "WEBP"),
         "rgba.tif": saved(noise("RGBA"), "TIFF"),
-        "palette-see-through.png": saved(picture.quantize(8), "PNG", transparency=bytes(range(0, 64, 8))),
+        "palette-see-through.png": saved(
+            picture.quantize(8), "PNG", transparency=bytes(range(0, 64, 8))
+        ),
         "key.png": saved(picture, "PNG", pnginfo=see_through),
         "cmyk.jpg": saved(picture.convert("CMYK"), "JPEG"),
         "cmyk.tif": saved(picture.convert("CMYK"), "TIFF"),

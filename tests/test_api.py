@@ -31,7 +31,11 @@ def picture(photo):
 
 
 def test_array_gives_array(picture):
-    assert isinstance(picture, np.ndarray) and picture.dtype == np.uint8 and picture.shape == (80, 120, 3)
+    assert (
+        isinstance(picture, np.ndarray)
+        and picture.dtype == np.uint8
+        and picture.shape == (80, 120, 3)
+    )
 
 
 def test_photo_is_not_changed(photo):
@@ -57,7 +61,9 @@ def test_path_gives_picture_or_path(photo, picture, tmp_path):
 
 
 def test_array_can_be_written_too(photo, picture, tmp_path):
-    made = crayonize.convert(photo, tmp_path / "out.png", strokes=tmp_path / "strokes.json", **CHOICES)
+    made = crayonize.convert(
+        photo, tmp_path / "out.png", strokes=tmp_path / "strokes.json", **CHOICES
+    )
     np.testing.assert_array_equal(made, picture)
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "out.png")), picture)
     drawing = load_drawing(tmp_path / "strokes.json")
@@ -95,10 +101,14 @@ def test_progress_can_stop_the_work(photo, tmp_path):
 
 
 def test_draw_takes_a_drawing_made_by_hand(tmp_path):
-    line = Stroke(np.array([[5, 10], [25, 12]], np.float32), np.array([2, 3], np.float32), "red", Tip())
+    line = Stroke(
+        np.array([[5, 10], [25, 12]], np.float32), np.array([2, 3], np.float32), "red", Tip()
+    )
     drawing = Drawing(30.0, 20.0, "smooth", "box8", (line,))
     told = []
-    made = crayonize.draw(drawing, 90, out=tmp_path / "line.jpg", progress=lambda *step: told.append(step))
+    made = crayonize.draw(
+        drawing, 90, out=tmp_path / "line.jpg", progress=lambda *step: told.append(step)
+    )
     assert made.shape == (60, 90, 3) and told[-1][1] == 1
     assert made[30:36, 30:60].astype(int).mean((0, 1)) @ [1, -1, 0] > 40  # red on the way
     assert made[50:].min() > 200  # paper elsewhere
@@ -146,18 +156,22 @@ def test_inputs_are_never_outputs(photo, tmp_path):
     before = (tmp_path / "photo.png").read_bytes()
     for name in ("photo.png", "paper.png"):
         with pytest.raises(ValueError, match="over"):
-            crayonize.convert(tmp_path / "photo.png", tmp_path / name, paper=str(tmp_path / "paper.png"))
+            crayonize.convert(
+                tmp_path / "photo.png", tmp_path / name, paper=str(tmp_path / "paper.png")
+            )
     assert (tmp_path / "photo.png").read_bytes() == before
 
 
 def test_notes_hold_no_folder(photo, tmp_path):
     (tmp_path / "mine.txt").write_text("#aa2211 brick\n#112233\n#ffeedd\n")
-    out = crayonize.convert(photo, tmp_path / "out.png", palette=str(tmp_path / "mine.txt"), **CHOICES)
+    out = crayonize.convert(
+        photo, tmp_path / "out.png", palette=str(tmp_path / "mine.txt"), **CHOICES
+    )
     assert str(tmp_path).encode() not in Path(tmp_path / "out.png").read_bytes()
     assert isinstance(out, np.ndarray)
 
 
-# ---- memory ----------------------------------------------------------------------------------------------
+# ---- memory --------------------------------------------------------------------------------------
 
 
 def test_memory_refuses_what_cannot_fit_and_names_a_size_that_does():
@@ -181,7 +195,9 @@ def test_no_size_is_named_if_none_fits():
 
 def test_a_photo_that_cannot_be_read_is_refused():
     deep = memory.decoding("PNG", 200_000_000, deep=True)
-    with pytest.raises(ValueError, match=r"the photo needs 3\.9 GB of memory, 2\.0 GB are free; reduce it first"):
+    with pytest.raises(
+        ValueError, match=r"the photo needs 3\.9 GB of memory, 2\.0 GB are free; reduce it first"
+    ):
         memory.check_fits(100, 100, photo=deep, available=2 * 10**9)
     memory.check_fits(100, 100, photo=memory.decoding("PNG", 200_000_000), available=2 * 10**9)
     assert memory.decoding("something new", 1) == memory.decoding("JPEG", 1, deep=True)
@@ -191,16 +207,37 @@ def test_a_photo_that_cannot_be_read_is_refused():
 def test_memory_is_looked_at_before_the_photo_is_read(photo, tmp_path, monkeypatch):
     Image.fromarray(photo).save(tmp_path / "photo.png")
     monkeypatch.setattr(memory, "available_bytes", lambda: 2_000_000_000)
-    monkeypatch.setattr("crayonize.images.read.read_linear", lambda *_: pytest.fail("began to read"))
+    monkeypatch.setattr(
+        "crayonize.images.read.Photo.light", lambda *_: pytest.fail("began to read")
+    )
     for image in (photo, Image.fromarray(photo), tmp_path / "photo.png"):
-        with pytest.raises(ValueError, match=r"size: 20000 x \d+ cells need \d+\.\d GB of memory, 2\.0 GB are free"):
+        with pytest.raises(
+            ValueError, match=r"size: 20000 x \d+ cells need \d+\.\d GB of memory, 2\.0 GB are free"
+        ):
             crayonize.convert(image, size=20000)
+
+
+def test_a_preview_may_be_twice_as_large(monkeypatch):
+    """It has a quarter of the cells: what just fits as a preview does not fit whole."""
+    monkeypatch.setattr(
+        memory, "available_bytes", lambda: memory.OVERHEAD + 1000**2 * memory.BYTES_PER_CELL
+    )
+    api.check_size(2, 2, 2000, preview=True)
+    api.check_size(2, 2, 1000, preview=False)
+    with pytest.raises(ValueError, match="a size of 1414 would fit"):
+        api.check_size(2, 1, 2000, preview=False)
+    with pytest.raises(ValueError, match="2000 x 2000 cells"):
+        api.check_size(2, 2, 2000, preview=False)
+    with pytest.raises(ValueError, match="1000 x 1000 cells"):
+        api.check_size(2, 2, 2000, preview=True, filmed=True)
 
 
 STATUS = Path("/proc/self/status")
 
 
-@pytest.mark.skipif(not STATUS.exists(), reason="the system does not tell a process its peak of memory")
+@pytest.mark.skipif(
+    not STATUS.exists(), reason="the system does not tell a process its peak of memory"
+)
 @pytest.mark.parametrize("suffix", [".png", ".webp"])
 def test_a_drawing_takes_no_more_memory_than_said_and_not_much_less(photo, tmp_path, suffix):
     Image.fromarray(photo).save(tmp_path / "photo.png")
@@ -209,7 +246,9 @@ def test_a_drawing_takes_no_more_memory_than_said_and_not_much_less(photo, tmp_p
         f"print(pathlib.Path({str(STATUS)!r}).read_text())"
     )
     files = tmp_path / "photo.png", tmp_path / f"out{suffix}"
-    told = subprocess.run([sys.executable, "-c", script, *files], capture_output=True, text=True, check=True).stdout
+    told = subprocess.run(
+        [sys.executable, "-c", script, *files], capture_output=True, text=True, check=True
+    ).stdout
     peak = 1024 * int(told.split("VmHWM:")[1].split()[0])
     said = memory.OVERHEAD + memory.BYTES_PER_CELL * 2100 * 1400
     assert 0.7 * said < peak < said

@@ -1,4 +1,6 @@
-"""What must be quick loads nothing heavy, and the stroke generator never knows the program that draws."""
+"""What must be quick loads nothing heavy, and the stroke generator never knows the program that
+draws.
+"""
 
 import ast
 import subprocess
@@ -36,7 +38,9 @@ except SystemExit:
 
 
 def test_importing_the_package_loads_nothing_heavy():
-    assert not modules_after("import crayonize; from crayonize import Settings, convert, draw") & set(HEAVY)
+    assert not modules_after(
+        "import crayonize; from crayonize import Settings, convert, draw"
+    ) & set(HEAVY)
 
 
 def test_heavy_modules_would_be_noticed():
@@ -53,4 +57,6 @@ def test_stroke_gen_never_imports_crayonize():
 
 
 def test_stroke_gen_works_alone():
-    assert "crayonize" not in modules_after("import stroke_gen.generate, stroke_gen.drawing, stroke_gen.params")
+    assert "crayonize" not in modules_after(
+        "import stroke_gen.generate, stroke_gen.drawing, stroke_gen.params"
+    )

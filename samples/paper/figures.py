@@ -1,9 +1,10 @@
-"""Figures 1, 5, 8, 10 and 11 of "Simulating Wax Crayons", drawn anew with the paper's own constants.
+"""Figures 1, 5, 8, 10 and 11 of "Simulating Wax Crayons", drawn anew with the paper's own
+constants.
 
     python samples/paper/figures.py OUT [--cell MM]
 
-Everything is drawn with the physics `rudolf2003` on cells of 0.1 mm (larger ones are faster). Figures 1, 5
-and 8 are close-ups, enlarged four times.
+Everything is drawn with the physics `rudolf2003` on cells of 0.1 mm (larger ones are faster).
+Figures 1, 5 and 8 are close-ups, enlarged four times.
 """
 
 import argparse
@@ -37,7 +38,9 @@ def main() -> None:
     """Draw all figures into a folder and print their paths."""
     parser = argparse.ArgumentParser(description="Draw the figures of the 2003 paper.")
     parser.add_argument("out", type=Path, metavar="OUT", help="folder for the figures")
-    parser.add_argument("--cell", type=float, default=0.1, metavar="MM", help="side of a cell (default: 0.1)")
+    parser.add_argument(
+        "--cell", type=float, default=0.1, metavar="MM", help="side of a cell (default: 0.1)"
+    )
     options = parser.parse_args()
     kernels.keep_kernels()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -47,7 +50,7 @@ def main() -> None:
         print(path)
 
 
-# ---- the sheets ------------------------------------------------------------------------------------------
+# ---- the sheets ----------------------------------------------------------------------------------
 
 
 def papers(cell: float) -> list[Easel]:
@@ -58,25 +61,40 @@ def papers(cell: float) -> list[Easel]:
 
 def forces(cell: float) -> Easel:
     """Fig. 5: four strokes, pressed harder from row to row."""
-    rows = [line((8, 3 + 4 * i), (42, 3 + 4 * i), force, "blue") for i, force in enumerate(FORCES_N)]
+    rows = [
+        line((8, 3 + 4 * i), (42, 3 + 4 * i), force, "blue") for i, force in enumerate(FORCES_N)
+    ]
     return drawn("lunar", 45, 18, rows, cell)
 
 
 def deposition_and_smearing(cell: float) -> list[Easel]:
     """Fig. 8: one crayon across another, first without and then with smearing."""
-    strokes = [hatch((3, 3, 23, 16), 0.3, "purple", 3.0), line((4, 22), (22, 6), 4.0, "orange", 3.4)]
+    strokes = [
+        hatch((3, 3, 23, 16), 0.3, "purple", 3.0),
+        line((4, 22), (22, 6), 4.0, "orange", 3.4),
+    ]
     return [drawn("lunar", 26, 26, strokes, cell, smears) for smears in (False, True)]
 
 
 def crayons(cell: float) -> list[Easel]:
-    """Fig. 10: every crayon light (first row) and heavy (second row), on white and on black paper."""
+    """Fig.
+
+    10: every crayon light (first row) and heavy (second row), on white and on black paper.
+    """
     names = [crayon.name for crayon in load_palette(PALETTE).crayons]
     strokes = [
-        hatch((SIDE * i + 2, SIDE * j + 2, SIDE * i + SIDE - 2, SIDE * j + SIDE - 2), pressure, name, 3.0)
+        hatch(
+            (SIDE * i + 2, SIDE * j + 2, SIDE * i + SIDE - 2, SIDE * j + SIDE - 2),
+            pressure,
+            name,
+            3.0,
+        )
         for i, name in enumerate(names)
         for j, pressure in enumerate((LIGHT, HEAVY))
     ]
-    return [drawn(paper, SIDE * len(names), SIDE * 2, strokes, cell) for paper in ("lunar", BLACK_PAPER)]
+    return [
+        drawn(paper, SIDE * len(names), SIDE * 2, strokes, cell) for paper in ("lunar", BLACK_PAPER)
+    ]
 
 
 def drawn(
@@ -95,8 +113,12 @@ def line(start: Point, end: Point, force: float, crayon: str, tip: float = 2.4) 
     return Stroke(path, np.full(2, force, np.float32), crayon, Tip("blunt", tip), "line")
 
 
-def hatch(box: tuple[float, float, float, float], pressure: float, crayon: str, tip: float) -> Stroke:
-    """A zigzag that fills a box (left, top, right, bottom), pressed at `pressure` N/mm^2 under the tip."""
+def hatch(
+    box: tuple[float, float, float, float], pressure: float, crayon: str, tip: float
+) -> Stroke:
+    """A zigzag that fills a box (left, top, right, bottom), pressed at `pressure` N/mm^2 under the
+    tip.
+    """
     left, top, right, bottom = box
     y = np.arange(top, bottom + 0.01, 0.62 * tip)
     x = np.where(np.arange(y.size) % 2, right, left)
@@ -104,7 +126,7 @@ def hatch(box: tuple[float, float, float, float], pressure: float, crayon: str, 
     return Stroke(np.stack([x, y], 1).astype(np.float32), force, crayon, Tip("blunt", tip))
 
 
-# ---- the figures -----------------------------------------------------------------------------------------
+# ---- the figures ---------------------------------------------------------------------------------
 
 
 def fig01(cell: float) -> Picture:
@@ -154,7 +176,9 @@ def strokes_of(drawing: Drawing, rows: int, cols: int) -> Picture:
         crayon = palette.crayons[palette.index(stroke.crayon)]
         colour = encode_srgb(np.array(colour_linear(crayon.hex), np.float32))
         points = np.round(stroke.path_mm * (8 * rows / drawing.height_mm)).astype(np.int32)
-        cv2.polylines(picture, [points], False, colour.tolist(), max(1, rows // 700), cv2.LINE_AA, shift=3)
+        cv2.polylines(
+            picture, [points], False, colour.tolist(), max(1, rows // 700), cv2.LINE_AA, shift=3
+        )
     return picture
 
 
@@ -164,7 +188,9 @@ FIGURES = {"fig01": fig01, "fig05": fig05, "fig08": fig08, "fig10": fig10, "fig1
 def close_up(stand: Easel) -> Picture:
     """The sheet enlarged four times."""
     picture = encode_srgb(stand.picture())
-    return np.asarray(cv2.resize(picture, None, fx=4, fy=4, interpolation=cv2.INTER_CUBIC), np.uint8)
+    return np.asarray(
+        cv2.resize(picture, None, fx=4, fy=4, interpolation=cv2.INTER_CUBIC), np.uint8
+    )
 
 
 def beside(*pictures: Picture) -> Picture:

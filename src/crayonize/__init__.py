@@ -4,8 +4,8 @@
 
     convert("photo.jpg", "out.png", palette="box24", seed=1)
 
-`Live` is a sheet to draw on by hand. Importing this is cheap; numpy, numba and OpenCV are loaded by the first
-call, or with `Live`.
+`Live` is a sheet to draw on by hand. Importing this is cheap; numpy, numba and OpenCV are loaded by
+the first call, or with `Live`.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -40,4 +40,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]

@@ -37,7 +37,8 @@ Progress = Callable[[str, float], None]  # what is being done, how much of all i
 MAX_SEED = 2**63 - 1
 MAX_SIZE = 20_000  # pixels along the long side
 MAX_THREADS = 256
-PHOTO_SIDE = 2048  # pixels of the photo's long side that are read: three times what the planner looks at
+# pixels of the photo's long side that are read: three times what the planner looks at
+PHOTO_SIDE = 2048
 STROKE_SUFFIXES = (".json", ".svg")
 _MM_PER_INCH = 25.4
 
@@ -57,18 +58,38 @@ def convert(
 ) -> Image | NDArray[np.uint8] | Path:
     """Draw a photo with wax crayons.
 
-    image: a path, a Pillow image, or an array as `image_read.read_linear` takes it.
+    Parameters
+    ----------
+    image: a path, a Pillow image, or an array (h, w), (h, w, 3) or (h, w, 4) of uint8, uint16 or
+        sRGB-encoded floats 0..1.
     out: where to write the drawing (PNG, JPEG, WebP or TIFF), with settings and seed inside.
-    strokes: where to save the strokes (.json), from which `draw` makes the same picture at any size; .svg for
-        other programs.
-    timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4), `seconds` long; show_tip: with the
-        crayon in view.   legend: put the crayons used beside the picture.
-    light: shade the relief of paper and wax.   progress: called with a name and the share done, 0..1.
-    choices: any field of `Settings` (palette, paper, style, force, size, seed, threads, preview, focus, ...).
+    strokes: where to save the strokes: .json, from which `draw` makes the same picture at any
+        size, or .svg for other programs.
+    timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4).
+    seconds: length of the film, 3 to 600.
+    show_tip: with the crayon in the film.
+    legend: put the crayons used beside the picture.
+    light: shade the relief of paper and wax.
+    progress: called with the name of what is being done and the share done, 0..1.
+    **choices: any field of `Settings` (palette, paper, style, force, size, seed, ...).
 
-    Returns the same kind as `image`: an array gives uint8 sRGB (h, w, 3), a Pillow image a Pillow image, a
-    path the path `out`, or a Pillow image if there is no `out`. ValueError, one line, for what the caller
-    can mend; TypeError for an unknown choice; OSError if a file cannot be written.
+    Returns
+    -------
+    The same kind as `image`: for an array uint8 sRGB (h, w, 3), for a Pillow image one, for a path
+    the path `out`, or a Pillow image if there is no `out`.
+
+    Raises
+    ------
+    ValueError: one line, for what the caller can mend.
+    TypeError: for an unknown choice.
+    OSError: if a file cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> sky = np.full((40, 60, 3), (120, 170, 230), np.uint8)
+    >>> convert(sky, size=90, style="sketch", seed=1).shape
+    (60, 90, 3)
     """
     import numpy as np
     from PIL import Image
@@ -95,14 +116,40 @@ def draw(
     light: bool = True,
     progress: Progress | None = None,
 ) -> NDArray[np.uint8]:
-    """The picture of a Drawing, or of a drawing's file: uint8 sRGB (h, w, 3), its long side `size` pixels.
+    """The picture of a Drawing, or of a drawing's file.
 
-    preview: at half the size. The rest, and the errors, as in `convert`.
+    Parameters
+    ----------
+    drawing: a `stroke_gen.drawing.Drawing`, or the path of one as .json, or of lines as .svg.
+    size: long side of the picture in pixels, 1 to 20000.
+    out: where to write the picture as well.
+    threads: at most so many at once; they change nothing in the picture. None: all cores.
+    preview: at half the size.
+    light, progress: as in `convert`.
+
+    Returns
+    -------
+    uint8 sRGB (h, w, 3).
+
+    Raises
+    ------
+    ValueError: one line, naming the stroke and the field that is wrong.
+    OSError: if `out` cannot be written.
+
+    Examples
+    --------
+    >>> from stroke_gen.drawing_file import drawing_from_json
+    >>> line = {"crayon": "red", "path": [[10, 10], [90, 50]]}
+    >>> house = {"format": "crayonize drawing", "version": 1, "sheet_mm": [100, 60],
+    ...          "paper": "smooth", "palette": "box8", "strokes": [line]}
+    >>> drawing = drawing_from_json(house)
+    >>> draw(drawing, size=200).shape
+    (120, 200, 3)
     """
     return finish(*redraw(drawing, size, threads, preview, progress, out=out), out, light=light)
 
 
-# ---- what the command line shares ------------------------------------------------------------------------
+# ---- what the command line shares ----------------------------------------------------------------
 
 
 def settings_of(choices: dict[str, Any]) -> Settings:
@@ -117,7 +164,9 @@ def settings_of(choices: dict[str, Any]) -> Settings:
     _check_threads(settings.threads)
     for box in settings.focus:
         if len(box) != 4 or not all(0 <= x <= 1 for x in box):
-            raise ValueError(f"focus: {box!r} is not x, y, w, h as fractions of the picture, from 0 to 1")
+            raise ValueError(
+                f"focus: {box!r} is not x, y, w, h as fractions of the picture, from 0 to 1"
+            )
     return settings.parsed()
 
 
@@ -134,7 +183,8 @@ def check_outputs(
 ) -> None:
     """Before any work: outputs have a format and a folder, and none is an input or another output.
 
-    ValueError for what is wrong with a path, PermissionError for a folder that may not be written to.
+    ValueError for what is wrong with a path, PermissionError for a folder that may not be written
+    to.
     """
     from .images.write import file_format, same_file
 
@@ -160,20 +210,28 @@ def check_outputs(
 
 
 def filming(
-    path: str | os.PathLike[str] | None, seconds: float = 12.0, show_tip: bool = False, light: bool = True
+    path: str | os.PathLike[str] | None,
+    seconds: float = 12.0,
+    show_tip: bool = False,
+    light: bool = True,
 ) -> AbstractContextManager[Watch | None]:
-    """What `sketch` and `redraw` take as `watch` to film the drawing into `path`; nothing for None."""
+    """What `sketch` and `redraw` take as `watch` to film the drawing into `path`; nothing for
+    None.
+    """
     if path is None:
         return nullcontext()
     workshop()
-    from .film import plan as timelapse
+    from .film.plan import Timelapse
 
     kernels.keep_kernels()
-    return timelapse.Timelapse(path, seconds, show_tip, light)
+    return Timelapse(path, seconds, show_tip, light)
 
 
 def sketch(
-    image: Source | Photo, settings: Settings, progress: Progress | None = None, watch: Watch | None = None
+    image: Source | Photo,
+    settings: Settings,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
     from .images.read import open_photo
@@ -197,7 +255,9 @@ def redraw(
     out: str | os.PathLike[str] | None = None,
     watch: Watch | None = None,
 ) -> tuple[Drawing, Easel]:
-    """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the sheet."""
+    """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the
+    sheet.
+    """
     from stroke_gen.drawing import Drawing, check_drawing
 
     checks.whole(size, 1, MAX_SIZE, "size")
@@ -208,8 +268,9 @@ def redraw(
     else:
         drawing = load_strokes(drawing)
     check_size(drawing.width_mm, drawing.height_mm, size, preview, filmed=watch is not None)
-    easel: Easel = workshop().draw(drawing, size, threads=threads, preview=preview, progress=progress,
-                                   watch=watch)  # fmt: skip
+    easel: Easel = workshop().draw(
+        drawing, size, threads=threads, preview=preview, progress=progress, watch=watch
+    )
     return drawing, easel
 
 
@@ -232,12 +293,16 @@ def load_strokes(
     from .svg.load import load_svg
 
     if Path(path).suffix.lower() == ".svg":
-        return load_svg(path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say)
+        return load_svg(
+            path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say
+        )
     drawing = load_drawing(path)
     return replace(drawing, palette=palette or drawing.palette, paper=paper or drawing.paper)
 
 
-def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None) -> list[Path]:
+def save_steps(
+    drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None
+) -> list[Path]:
     """Pages that show how to draw a Drawing, as a .pdf or .png files; see steps.py."""
     workshop()
     from .pages import steps
@@ -245,10 +310,16 @@ def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress
     return steps.save_steps(drawing, out, progress)
 
 
-def check_size(width: float, height: float, size: int, preview: bool, *, photo: int = 0, filmed: bool = False) -> None:
-    """ValueError if the sheet for a picture of these proportions does not fit into memory; see memory.check_fits."""
+def check_size(
+    width: float, height: float, size: int, preview: bool, *, photo: int = 0, filmed: bool = False
+) -> None:
+    """ValueError if the sheet for a picture of these proportions does not fit into memory; see
+    memory.check_fits.
+    """
     cell = max(width, height) / (size / 2 if preview else size)
-    memory.check_fits(max(1, round(height / cell)), max(1, round(width / cell)), photo=photo, filmed=filmed)
+    memory.check_fits(
+        max(1, round(height / cell)), max(1, round(width / cell)), photo=photo, filmed=filmed
+    )
 
 
 def finish(
@@ -265,7 +336,8 @@ def finish(
     """The picture as uint8 sRGB; written to `out` and its strokes to `strokes` if these are given.
 
     settings: of the photo, to be noted in the picture beside what the drawing itself says.
-    kept: tags of the photo that go into the picture, see metadata.py.   legend: with the crayons used.
+    kept: tags of the photo that go into the picture, see metadata.py.   legend: with the crayons
+        used.
     """
     from stroke_gen.drawing_file import save_drawing
 
@@ -302,7 +374,9 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 
     chosen = {name: getattr(drawing, name) for name in ("paper", "palette", "physics", "seed")}
     if settings:  # the number of threads changes nothing in the picture
-        chosen |= {f.name: getattr(settings, f.name) for f in fields(settings) if f.name != "threads"}
+        chosen |= {
+            f.name: getattr(settings, f.name) for f in fields(settings) if f.name != "threads"
+        }
     named = {name: short(value) for name, value in chosen.items() if value not in (None, ())}
     return {"crayonize": __version__, **named}
 
@@ -318,7 +392,9 @@ def workshop() -> ModuleType:
 
 
 def warm_up() -> None:
-    """Draw a narrow strip in every style, film it, open a live sheet: through all kernels, that they are kept."""
+    """Draw a narrow strip in every style, film it, open a live sheet: through all kernels, that
+    they are kept.
+    """
     import tempfile
 
     import numpy as np
@@ -334,5 +410,7 @@ def warm_up() -> None:
         convert(strip, style=style, size=400, sheet_mm=100.0)
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film.png"
-        convert(strip, size=400, sheet_mm=100.0, preview=True, light=False, timelapse=film, seconds=3)
+        convert(
+            strip, size=400, sheet_mm=100.0, preview=True, light=False, timelapse=film, seconds=3
+        )
     Live(Drawing(10.0, 10.0, "drawing", "box24", ()), 50)

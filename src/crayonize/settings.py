@@ -25,11 +25,15 @@ _PARSED = {  # what is kept -> the choices that it comes from
 
 @dataclass(frozen=True)
 class Settings:
-    """All choices for drawing a photo, with their defaults."""
+    """All choices for drawing a photo, with their defaults.
 
-    palette: str | dict[str, Any] = "box24"
-    paper: str | dict[str, Any] = "drawing"
-    style: str = "artist"
+    >>> Settings(palette="box8", seed=7).box.title
+    'Box of 8'
+    """
+
+    palette: str | dict[str, Any] = "box24"  # a shipped name, a file, colours #rrggbb,..., or JSON
+    paper: str | dict[str, Any] = "drawing"  # a shipped name, NAME:#rrggbb, a picture, or JSON
+    style: str = "artist"  # a shipped name or a .toml file
     force: str | float = "normal"  # light, normal, heavy, or a factor
     size: int = 1600  # long side of the picture in pixels
     sheet_mm: float = 297.0  # long side of the sheet: A4
@@ -39,7 +43,8 @@ class Settings:
     preview: bool = False
     age: int | None = None  # of the one who draws, 3 to 10, for style child
     left_handed: bool = False  # hatching from upper left to lower right
-    focus: tuple[tuple[float, float, float, float], ...] = ()  # boxes x, y, w, h in fractions of the picture
+    # boxes x, y, w, h in fractions of the picture
+    focus: tuple[tuple[float, float, float, float], ...] = ()
 
     @cached_property
     def box(self) -> Palette:

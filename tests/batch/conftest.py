@@ -1,4 +1,6 @@
-"""A folder of small photos, a batch over it in a process of its own, and what must hold after every fault."""
+"""A folder of small photos, a batch over it in a process of its own, and what must hold after every
+fault.
+"""
 
 import hashlib
 import json
@@ -18,6 +20,8 @@ import pytest
 from PIL import Image
 
 HERE = Path(__file__).parent
+# s after which something is taken to hang for ever: no test says how long anything takes
+HANGS = 300.0
 ROOT = HERE.parent.parent
 _CALM: dict[
     tuple[tuple[str, str], ...], dict[str, str]
@@ -38,7 +42,9 @@ def tree(folder: Path) -> dict[str, str]:
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and not path.is_symlink() and ".crayonize" not in path.relative_to(folder).parts
+        if path.is_file()
+        and not path.is_symlink()
+        and ".crayonize" not in path.relative_to(folder).parts
     }
 
 
@@ -59,7 +65,7 @@ class Batch:
         self.lines: list[dict[str, Any]] = []
         self.said = ""
 
-    def end(self, limit: float = 60) -> int:
+    def end(self, limit: float = HANGS) -> int:
         """Wait for the end; the exit code."""
         out, err = self.process.communicate(timeout=limit)
         self.lines = [json.loads(line) for line in (out or b"").decode("utf-8").splitlines()]
@@ -81,11 +87,12 @@ class Batch:
         """The workers alive now."""
         return self.session()
 
-    def wait_until(self, happened: Callable[[], object], limit: float = 20) -> None:
-        """Wait for a state that is then to be disturbed."""
-        end = time.monotonic() + limit
+    def wait_until(self, happened: Callable[[], object], ended: bool = False) -> None:
+        """Wait for a state; ended: of a run that is over, else it must go on until then."""
+        end = time.monotonic() + HANGS
         while not happened():
-            assert time.monotonic() < end and self.process.poll() is None, "that never happened"
+            assert time.monotonic() < end, "that never happened"
+            assert ended or self.process.poll() is None, "the run is over"
             time.sleep(0.002)
 
     def begun(self, pictures: int = 1) -> Callable[[], bool]:
@@ -136,7 +143,9 @@ class Desk:
         """Start a batch with two workers."""
         if self._before is None:
             self._before = tree(self.photos)
-        run = Batch([self.photos], output or self.pictures, ["-j", "2", *words], prefix or [], **how)
+        run = Batch(
+            [self.photos], output or self.pictures, ["-j", "2", *words], prefix or [], **how
+        )
         self._runs.append(run)
         return run
 

@@ -1,8 +1,12 @@
-"""Runs a batch as the command does, with the stand-in for the sketcher: drive.py INPUT... -o OUTPUT ..."""
+"""Runs a batch as the command does, with the stand-in for the sketcher: drive.py INPUT...
+
+-o OUTPUT ...
+"""
 
 import argparse
 import sys
 
+from crayonize.batch import crew
 from crayonize.batch.conductor import run
 from crayonize.batch.job import Recipe
 from crayonize.cli import folders
@@ -15,9 +19,11 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--metadata", default="safe")
     parser.add_argument("--memory", type=int)
+    parser.add_argument("--grace", type=float, default=crew.GRACE)
     parser.add_argument("--render", default="stand_in:sketch")
     folders.add_options(parser)
     words = parser.parse_args()
+    crew.GRACE = words.grace
     recipe = Recipe(
         Settings(size=64, seed=words.seed),
         metadata=words.metadata,

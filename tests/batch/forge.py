@@ -1,7 +1,8 @@
-"""One conversion in a process that waits for its observer: forge.py, then lines `PHOTO PICTURE` on stdin.
+"""One conversion in a process that waits for its observer: forge.py, then lines `PHOTO PICTURE` on
+stdin.
 
-All libraries are loaded once; each line forks a child that prints its number, waits for a further line,
-converts, and whose verdict is printed at its end.
+All libraries are loaded once; each line forks a child that prints its number, waits for a further
+line, converts, and whose verdict is printed at its end.
 """
 
 import os
@@ -23,7 +24,9 @@ if __name__ == "__main__":
             os.write(1, b"%d\n" % os.getpid())
             select.select([gate], [], [])  # no call that a test counts
             try:
-                outcome = studio.make(Job(Found("p", "p", photo, 1, ""), "p", picture), lambda needed: True)
+                outcome = studio.make(
+                    Job(Found("p", "p", photo, 1, ""), "p", picture), lambda needed: True
+                )
                 verdict = f"{outcome.status} {outcome.error}"
             except Exception as error:
                 verdict = f"{type(error).__name__} {error}"

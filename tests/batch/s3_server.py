@@ -1,4 +1,6 @@
-"""Just enough of S3 for a client to list, read and write one bucket: an in-memory server on 127.0.0.1."""
+"""Just enough of S3 for a client to list, read and write one bucket: an in-memory server on
+127.0.0.1.
+"""
 
 import email.utils
 import hashlib
@@ -40,9 +42,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_PUT(self) -> None:
         name, _ = self._asked()
-        if self.headers.get("Transfer-Encoding", "") == "chunked" or "aws-chunked" in self.headers.get(
-            "Content-Encoding", ""
-        ):
+        if self.headers.get(
+            "Transfer-Encoding", ""
+        ) == "chunked" or "aws-chunked" in self.headers.get("Content-Encoding", ""):
             content = self._unchunked()
         else:
             content = self.rfile.read(int(self.headers.get("Content-Length", 0)))
@@ -72,11 +74,18 @@ class _Handler(BaseHTTPRequestHandler):
             return self._answer(404, b"<Error><Code>NoSuchKey</Code></Error>" if with_body else b"")
         when = email.utils.formatdate(0, usegmt=True)
         if not with_body:
-            return self._answer(200, b"", length=len(content), ETag=_etag(content), Last_Modified=when)
+            return self._answer(
+                200, b"", length=len(content), ETag=_etag(content), Last_Modified=when
+            )
         first, _, last = self.headers.get("Range", "bytes=0-").removeprefix("bytes=").partition("-")
         part = content[int(first) : int(last) + 1 if last else None]
-        self._answer(206 if "Range" in self.headers else 200, part, ETag=_etag(content), Last_Modified=when,
-                     Content_Range=f"bytes {first}-{int(first) + len(part) - 1}/{len(content)}")  # fmt: skip
+        self._answer(
+            206 if "Range" in self.headers else 200,
+            part,
+            ETag=_etag(content),
+            Last_Modified=when,
+            Content_Range=f"bytes {first}-{int(first) + len(part) - 1}/{len(content)}",
+        )
 
     def _list(self, bucket: str, query: dict[str, list[str]]) -> None:
         prefix, divider = query.get("prefix", [""])[0], query.get("delimiter", [""])[0]
@@ -88,8 +97,10 @@ class _Handler(BaseHTTPRequestHandler):
             if divider and divider in key[len(prefix) :]:
                 folders.add(prefix + key[len(prefix) :].split(divider)[0] + divider)
                 continue
-            rows.append(f"<Contents><Key>{escape(key)}</Key><LastModified>1970-01-01T00:00:00.000Z</LastModified>"
-                        f"<ETag>{_etag(content)}</ETag><Size>{len(content)}</Size></Contents>")  # fmt: skip
+            rows.append(
+                f"<Contents><Key>{escape(key)}</Key><LastModified>1970-01-01T00:00:00.000Z</LastModified>"
+                f"<ETag>{_etag(content)}</ETag><Size>{len(content)}</Size></Contents>"
+            )
         rows += [
             f"<CommonPrefixes><Prefix>{escape(folder)}</Prefix></CommonPrefixes>"
             for folder in sorted(folders)

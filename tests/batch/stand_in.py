@@ -1,8 +1,8 @@
 """A cheap sketcher for batch tests: reads the photo as always, then acts as the photo's name asks.
 
-`NAME.0.5s.png` takes half a second; the words hang, spin, segv, abort, exit, eat, shout and once at the start
-of a name make the worker sleep for ever, loop for ever, crash, end, use up memory, print, or die at the first
-try only.
+`NAME.0.5s.png` takes half a second; the words hang, spin, segv, abort, exit, eat, shout and once at
+the start of a name make the worker sleep for ever, loop for ever, crash, end, use up memory, print,
+or die at the first try only.
 """
 
 import os

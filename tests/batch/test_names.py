@@ -55,7 +55,9 @@ def refused(inputs: list[Path], output: Path, **options: object) -> str:
             Recipe(Settings()),
             render="stand_in:sketch",
         )
-    assert not output.exists() or ".crayonize" not in os.listdir(output), "nothing is written before"
+    assert not output.exists() or ".crayonize" not in os.listdir(output), (
+        "nothing is written before"
+    )
     return str(caught.value)
 
 
@@ -100,7 +102,11 @@ def test_a_path_too_long_for_the_system(desk: Desk) -> None:
         os.chdir(here)
         result = Batch([desk.photos], desk.pictures, [], [])
         assert result.end() == 3
-        assert result.count("ok") == 2 and result.count("failed") == 1 and "cannot be listed" in result.said
+        assert (
+            result.count("ok") == 2
+            and result.count("failed") == 1
+            and "cannot be listed" in result.said
+        )
     finally:
         os.chdir(here)
         os.close(here)
@@ -144,7 +150,10 @@ def test_two_photos_for_one_place_are_refused(desk: Desk, names: tuple[str, str]
     for name in names:
         photo(desk.photos / name)
     reason = refused([desk.photos], desk.pictures)
-    assert all(os.path.basename(name.split("/b")[0]) in reason for name in names) and "--name" in reason
+    assert (
+        all(os.path.basename(name.split("/b")[0]) in reason for name in names)
+        and "--name" in reason
+    )
 
 
 def test_the_whole_name_keeps_a_jpg_and_a_png_apart(desk: Desk) -> None:
@@ -189,14 +198,26 @@ def test_a_list_of_photos_is_never_written_over(desk: Desk) -> None:
     assert "over a photo" in refused([more], desk.pictures)
     more.unlink()
     result = desk.run("--existing", "overwrite")
-    assert result.process.returncode == 3 and result.count("failed") == 2 and "its own place" in result.said
+    assert (
+        result.process.returncode == 3
+        and result.count("failed") == 2
+        and "its own place" in result.said
+    )
 
 
 def test_photos_of_one_name_from_two_folders(desk: Desk) -> None:
     paths = [photo(desk.photos / folder / "a.png") for folder in "xy"]
     assert "both become 'a.png'" in refused(paths, desk.pictures)
-    assert run([str(desk.photos / "x"), str(desk.photos / "y")], str(desk.pictures), Options(quiet=True),
-               Recipe(Settings()), render="stand_in:sketch") == 0  # fmt: skip
+    assert (
+        run(
+            [str(desk.photos / "x"), str(desk.photos / "y")],
+            str(desk.pictures),
+            Options(quiet=True),
+            Recipe(Settings()),
+            render="stand_in:sketch",
+        )
+        == 0
+    )
     assert set(tree(desk.pictures)) == {"x/a.png", "y/a.png"}
 
 
@@ -207,7 +228,14 @@ def test_patterns_and_named_links_and_files(desk: Desk) -> None:
     (desk.photos / "c.png").symlink_to(desk.photos / "a1.png")
     names = [str(desk.photos / name) for name in ("a*.png", "b.odd", "c.png", "a1.png")]
     assert (
-        run(names, str(desk.pictures), Options(quiet=True), Recipe(Settings()), render="stand_in:sketch") == 0
+        run(
+            names,
+            str(desk.pictures),
+            Options(quiet=True),
+            Recipe(Settings()),
+            render="stand_in:sketch",
+        )
+        == 0
     )
     assert set(tree(desk.pictures)) == {"a1.png", "a2.png", "b.png", "c.png"}
     assert "no such" in refused([desk.photos / "z*.png"], desk.base / "more")
@@ -235,7 +263,10 @@ def test_templates_that_are_refused(template: str) -> None:
 
 def test_names_by_template() -> None:
     more = {"palette": "box24"}
-    assert picture_name("d/e/a.b.jpg", "{parent}-{stem}.{palette}", ".png", more) == "d/e/e-a.b.box24.png"
+    assert (
+        picture_name("d/e/a.b.jpg", "{parent}-{stem}.{palette}", ".png", more)
+        == "d/e/e-a.b.box24.png"
+    )
     assert picture_name("a.jpg", "{name}", ".webp", {}) == "a.jpg.webp"
     assert folded("STRASSE") == folded("straße")
     assert folded("\u00e9") == folded("e\u0301") == folded("E\u0301")

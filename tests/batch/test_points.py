@@ -1,4 +1,6 @@
-"""One conversion, cut off or refused at any of its system calls: the old picture, the new one, or none."""
+"""One conversion, cut off or refused at any of its system calls: the old picture, the new one, or
+none.
+"""
 
 import os
 import re
@@ -36,10 +38,13 @@ class Forge:
         self._errors = base / "errors"
         with open(self._errors, "wb") as errors:
             self._process = subprocess.Popen(
-                [sys.executable, str(HERE / "forge.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                 text=True,
-                stderr=errors, env={**os.environ, "PYTHONPATH": path},
-            )  # fmt: skip
+                [sys.executable, str(HERE / "forge.py")],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                stderr=errors,
+                env={**os.environ, "PYTHONPATH": path},
+            )
 
     def convert(self, *words: str) -> tuple[int, str, str]:
         """One conversion with strace told `words`: exit code, verdict, and the trace."""
@@ -48,7 +53,9 @@ class Forge:
         self._say(f"{self.photo} {self.picture}")
         child, trace = self._process.stdout.readline().strip(), self.base / "trace"
         strace = subprocess.Popen(
-            ["strace", "-qq", "-y", "-o", str(trace), "-p", child, *words], stderr=subprocess.PIPE, text=True
+            ["strace", "-qq", "-y", "-o", str(trace), "-p", child, *words],
+            stderr=subprocess.PIPE,
+            text=True,
         )
         tracer = re.compile(rf"TracerPid:\t{strace.pid}\b")
         while not tracer.search(Path(f"/proc/{child}/status").read_text()):
@@ -57,7 +64,7 @@ class Forge:
                 break
         self._say("go")
         code = int(self._process.stdout.readline())
-        strace.communicate(timeout=10)
+        strace.communicate(timeout=300)
         return code, self._errors.read_text().strip("\0\n"), trace.read_text()
 
     def _say(self, line: str) -> None:
@@ -126,7 +133,9 @@ def test_refused_by_the_system(forge: Forge, there: bool, call: str, at: str, er
     lines = [line for line in trace.splitlines() if line.startswith(call)]
     when = 1 + next(i for i, line in enumerate(lines) if marks[at] in line)
     forge.blank(old)
-    code, verdict, _ = forge.convert("-e", f"trace={call}", "-e", f"inject={call}:error={error}:when={when}")
+    code, verdict, _ = forge.convert(
+        "-e", f"trace={call}", "-e", f"inject={call}:error={error}:when={when}"
+    )
     assert code == 0
     assert verdict.startswith("failed cannot be read" if call == "read" else "OutputError"), verdict
     assert call == "read" or str(forge.picture.parent) in verdict, "the message names the path"

@@ -22,8 +22,10 @@ fsspec = pytest.importorskip("fsspec")
 def start(source: object, target: object, *words: str, **env: str) -> Batch:
     """Run a batch between URLs to its end."""
     path = os.pathsep.join(map(str, (ROOT / "src", ROOT, HERE)))
-    batch = Batch([source], target, ["-j", "2", *words], [], env={**os.environ, "PYTHONPATH": path, **env})  # type: ignore[list-item,arg-type]
-    batch.end(120)
+    batch = Batch(
+        [source], target, ["-j", "2", *words], [], env={**os.environ, "PYTHONPATH": path, **env}
+    )  # type: ignore[list-item,arg-type]
+    batch.end()
     return batch
 
 
@@ -38,8 +40,13 @@ def store() -> Iterator[Store]:
 @pytest.fixture
 def login(store: Store) -> dict[str, str]:
     """What a client needs to find the store."""
-    return {"FSSPEC_S3_ENDPOINT_URL": store.url, "AWS_ACCESS_KEY_ID": "a", "AWS_SECRET_ACCESS_KEY": "b",
-            "AWS_DEFAULT_REGION": "us-east-1", "AWS_EC2_METADATA_DISABLED": "true"}  # fmt: skip
+    return {
+        "FSSPEC_S3_ENDPOINT_URL": store.url,
+        "AWS_ACCESS_KEY_ID": "a",
+        "AWS_SECRET_ACCESS_KEY": "b",
+        "AWS_DEFAULT_REGION": "us-east-1",
+        "AWS_EC2_METADATA_DISABLED": "true",
+    }
 
 
 @pytest.fixture
@@ -57,7 +64,9 @@ def copies() -> set[str]:
     return {name for name in os.listdir(tempfile.gettempdir()) if name.startswith("crayonize-")}
 
 
-def test_from_bucket_to_bucket(store: Store, login: dict[str, str], photos: Path, tmp_path: Path) -> None:
+def test_from_bucket_to_bucket(
+    store: Store, login: dict[str, str], photos: Path, tmp_path: Path
+) -> None:
     pytest.importorskip("s3fs")
     before = copies()
     for path in photos.rglob("*.*"):
@@ -67,10 +76,14 @@ def test_from_bucket_to_bucket(store: Store, login: dict[str, str], photos: Path
     assert (first.count("ok"), first.count("failed"), first.count("ignored")) == (6, 1, 1)
     start(photos, tmp_path / "home")
     made = {
-        name.removeprefix("photos/out/"): content for name, content in store.files.items() if "/out/" in name
+        name.removeprefix("photos/out/"): content
+        for name, content in store.files.items()
+        if "/out/" in name
     }
     assert {name for name in made if ".crayonize" not in name} == set(tree(tmp_path / "home"))
-    assert all(made[name] == (tmp_path / "home" / name).read_bytes() for name in tree(tmp_path / "home"))
+    assert all(
+        made[name] == (tmp_path / "home" / name).read_bytes() for name in tree(tmp_path / "home")
+    )
     again = start("s3://photos/in", "s3://photos/out", **login)
     assert (again.count("skipped"), again.count("failed")) == (6, 1)
     store.files["photos/in/0/p 0.png"] = store.files["photos/in/1/p 1.png"]
@@ -78,12 +91,16 @@ def test_from_bucket_to_bucket(store: Store, login: dict[str, str], photos: Path
     assert copies() == before, "no local copy is left"
 
 
-def test_from_home_to_a_bucket_that_is_full(store: Store, login: dict[str, str], photos: Path) -> None:
+def test_from_home_to_a_bucket_that_is_full(
+    store: Store, login: dict[str, str], photos: Path
+) -> None:
     pytest.importorskip("s3fs")
     store.full = True
     result = start(photos, "s3://photos/out", **login)
     assert (
-        result.process.returncode == 1 and "s3://photos/out" in result.said and "Traceback" not in result.said
+        result.process.returncode == 1
+        and "s3://photos/out" in result.said
+        and "Traceback" not in result.said
     )
     store.full = False
     assert start(photos, "s3://photos/out", **login).count("ok") == 6
@@ -94,7 +111,9 @@ def test_file_urls_and_what_others_put_there(photos: Path, tmp_path: Path) -> No
     photo(out / "0" / "p 0.png", 9)
     result = start(f"file://{photos}", f"file://{out}")
     assert (
-        result.process.returncode == 3 and result.status("0/p 0.png") == "failed" and result.count("ok") == 5
+        result.process.returncode == 3
+        and result.status("0/p 0.png") == "failed"
+        and result.count("ok") == 5
     )
     assert "not made here" in result.said
     assert start(f"file://{photos}", f"file://{out}", "--existing", "overwrite").count("ok") == 6
@@ -122,4 +141,8 @@ def test_listing_by_memory() -> None:
 
 def test_a_service_that_is_not_known(photos: Path, tmp_path: Path) -> None:
     result = start("nothing://bucket/in", tmp_path / "out")
-    assert result.process.returncode == 2 and "nothing" in result.said and "Traceback" not in result.said
+    assert (
+        result.process.returncode == 2
+        and "nothing" in result.said
+        and "Traceback" not in result.said
+    )

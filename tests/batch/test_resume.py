@@ -65,7 +65,9 @@ def test_existing(desk: Desk, existing: str, code: int, counts: tuple[int, int] 
 
 
 def test_what_others_put_there_is_not_overwritten(desk: Desk) -> None:
-    """A picture without a line in the journal is drawn anew only if it says that it was made here."""
+    """A picture without a line in the journal is drawn anew only if it says that it was made
+    here.
+    """
     desk.fill(3).run()
     (desk.pictures / ".crayonize" / "journal.jsonl").unlink()
     mine = desk.pictures / "1" / "p0001.png"

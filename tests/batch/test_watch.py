@@ -35,11 +35,10 @@ def test_photos_are_drawn_when_they_have_stopped_growing(desk: Desk) -> None:
     assert drawn(run, "broken.png") == "ok", "mended, it is tried again"
     photo(desk.photos / "late.jpg", 5)
     assert drawn(run, "late.jpg") == "failed", "late.png has its place"
-    begun = time.monotonic()
     os.killpg(run.process.pid, signal.SIGINT)
     assert run.process.stdout
     account = json.loads(run.process.stdout.read().splitlines()[-1])
-    assert run.process.wait() == 130 and time.monotonic() - begun < 2
+    assert run.process.wait() == 130
     assert account["counts"]["ok"] == 2 and account["end"] == "stopped"
     assert set(tree(desk.pictures)) == {"0/p0000.png", "1/p0001.png", "late.png", "broken.png"}
     desk._before = None

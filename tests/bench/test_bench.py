@@ -1,4 +1,6 @@
-"""The benchmark measures what it says and tells it in both ways; no test here asks how fast anything is."""
+"""The benchmark measures what it says and tells it in both ways; no test here asks how fast
+anything is.
+"""
 
 import json
 import math
@@ -8,7 +10,9 @@ import numpy as np
 import pytest
 
 from crayonize import cli
+from crayonize.bench import measure as measuring
 from crayonize.bench import parts as bench
+from crayonize.bench.table import table
 from crayonize.images.read import read_linear
 
 TINY_MP = (0.01, 0.02, 0.03)
@@ -18,7 +22,7 @@ TINY_MP = (0.01, 0.02, 0.03)
 def found():
     """All figures, from tiny pictures, all in this process but for the uncompiled strokes."""
     with pytest.MonkeyPatch.context() as patch:
-        in_child, staged = bench._child, bench._staged
+        in_child, staged = bench.child, bench._staged
 
         def here(part, *given, **environment):
             if environment:
@@ -26,11 +30,15 @@ def found():
             tiny = {"rubbing": (120, 1), "live": (200, 12)}
             return json.loads(json.dumps(bench.PARTS[part](*tiny.get(part, given))))
 
-        patch.setattr(bench, "_child", here)
-        patch.setattr(bench, "_staged", lambda path, mp: None if path.stem == "small" else staged(path, mp))
-        patch.setattr(bench, "SIZES_MP", TINY_MP)
-        patch.setattr(bench, "_starts", lambda folder, repeats, cold: {"help": 0.1, "photo_800": 1.0})
-        return bench.measure(quick=True)
+        patch.setattr(bench, "child", here)
+        patch.setattr(
+            bench, "_staged", lambda path, mp: None if path.stem == "small" else staged(path, mp)
+        )
+        patch.setattr(measuring, "SIZES_MP", TINY_MP)
+        patch.setattr(
+            measuring, "_starts", lambda folder, repeats, cold: {"help": 0.1, "photo_800": 1.0}
+        )
+        return measuring.measure(quick=True)
 
 
 def numbers(figures):
@@ -44,8 +52,18 @@ def numbers(figures):
 
 
 def test_all_is_measured(found):
-    assert set(found) == {"crayonize", "quick", "machine", "start", "cell_steps_per_second", "sheets", "threads",
-                          "live_ms", "yardsticks", "ratios"}  # fmt: skip
+    assert set(found) == {
+        "crayonize",
+        "quick",
+        "machine",
+        "start",
+        "cell_steps_per_second",
+        "sheets",
+        "threads",
+        "live_ms",
+        "yardsticks",
+        "ratios",
+    }
     assert set(found["machine"]) == {"cpu", "cores", "system", "python", "numpy", "numba", "cv2"}
     assert set(found["cell_steps_per_second"]) == {"smearing", "without_smearing"}
     assert [sheet["megapixels"] for sheet in found["sheets"]] == [0.01, 0.02]
@@ -56,8 +74,17 @@ def test_all_is_measured(found):
     assert {"1", str(found["machine"]["cores"])} <= counts == set(found["threads"]["speed_up"])
     assert set(found["live_ms"]) == {"1600", "3508"}
     assert all(set(took) == {"min", "median", "max"} for took in found["live_ms"].values())
-    assert set(found["yardsticks"]) == {"strokes", "strokes_uncompiled", "oil_painting", "stylization"}
-    assert set(found["ratios"]) == {"uncompiled_over_kernels", "whole_over_uncompiled_strokes", "whole_over_filters"}
+    assert set(found["yardsticks"]) == {
+        "strokes",
+        "strokes_uncompiled",
+        "oil_painting",
+        "stylization",
+    }
+    assert set(found["ratios"]) == {
+        "uncompiled_over_kernels",
+        "whole_over_uncompiled_strokes",
+        "whole_over_filters",
+    }
 
 
 def test_figures_are_positive_and_no_stage_is_left_out(found):
@@ -78,10 +105,20 @@ def test_sums_and_ratios_are_of_what_they_say(found):
 
 
 def test_table_shows_every_part(found):
-    text = bench.table(found)
+    text = table(found)
     assert all(len(line) <= 110 for line in text.splitlines()) and text == text.rstrip()
-    for word in (*bench.STAGES, "with smearing", "peak memory", "threads, 0.02 MP", "A4, 3508", "help", "oilPainting",
-                 "uncompiled", found["machine"]["cpu"], found["machine"]["numba"]):  # fmt: skip
+    for word in (
+        *bench.STAGES,
+        "with smearing",
+        "peak memory",
+        "threads, 0.02 MP",
+        "A4, 3508",
+        "help",
+        "oilPainting",
+        "uncompiled",
+        found["machine"]["cpu"],
+        found["machine"]["numba"],
+    ):
         assert word in text
 
 
@@ -114,28 +151,36 @@ def test_photo_is_the_same_each_time_and_has_the_size_asked_for(tmp_path):
 
 
 def test_a_part_runs_in_a_process_of_its_own():
-    assert bench._child("machine") == bench.machine()
+    assert bench.child("machine") == bench.machine()
 
 
 def test_a_part_that_fails_is_named():
     with pytest.raises(RuntimeError, match=r"^bench: filters: .*rror"):
-        bench._child("filters", "/missing.jpg", 1)
+        bench.child("filters", "/missing.jpg", 1)
 
 
 def test_starts_are_timed_warm_and_with_an_empty_cache(tmp_path, monkeypatch):
     asked = []
-    monkeypatch.setattr(bench, "_child", lambda *_: None)
-    monkeypatch.setattr(bench.subprocess, "run", lambda line, env, **_: asked.append((line[2:], env)))
-    found = bench._starts(str(tmp_path), 2, cold=True)
-    assert set(found) == {"help", "photo_800", "photo_800_cold"} and all(seconds > 0 for seconds in found.values())
+    monkeypatch.setattr(bench, "child", lambda *_: None)
+    monkeypatch.setattr(
+        measuring.subprocess, "run", lambda line, env, **_: asked.append((line[2:], env))
+    )
+    found = measuring._starts(str(tmp_path), 2, cold=True)
+    assert set(found) == {"help", "photo_800", "photo_800_cold"} and all(
+        seconds > 0 for seconds in found.values()
+    )
     draws = [(line, env) for line, env in asked if "--help" not in line]
     assert len(draws) == 4 and all(line == draws[0][0] for line, _ in draws)
     assert draws[-1][1]["CRAYONIZE_CACHE"] == str(tmp_path / "cache")
-    assert all(env["CRAYONIZE_CACHE"] != str(tmp_path / "cache") for _, env in draws[:-1] if "CRAYONIZE_CACHE" in env)
-    assert set(bench._starts(str(tmp_path), 1, cold=False)) == {"help", "photo_800"}
+    assert all(
+        env["CRAYONIZE_CACHE"] != str(tmp_path / "cache")
+        for _, env in draws[:-1]
+        if "CRAYONIZE_CACHE" in env
+    )
+    assert set(measuring._starts(str(tmp_path), 1, cold=False)) == {"help", "photo_800"}
 
 
-# ---- the command -----------------------------------------------------------------------------------------
+# ---- the command ---------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -148,7 +193,7 @@ def run(capsys, monkeypatch, found):
         return found
 
     def run(*words):
-        monkeypatch.setattr(bench, "measure", measure)
+        monkeypatch.setattr(measuring, "measure", measure)
         asked.clear()
         return cli.main(["bench", *map(str, words)]), *capsys.readouterr(), asked
 
@@ -156,13 +201,13 @@ def run(capsys, monkeypatch, found):
 
 
 def test_it_prints_the_table(run, found):
-    assert run() == (0, bench.table(found) + "\n", "", [False])
+    assert run() == (0, table(found) + "\n", "", [False])
     assert run("--quick")[3] == [True]
 
 
 def test_it_writes_json_beside_the_table(run, found, tmp_path):
     code, out, err, _ = run("--json", tmp_path / "all.json")
-    assert (code, out, err) == (0, bench.table(found) + "\n", "")
+    assert (code, out, err) == (0, table(found) + "\n", "")
     assert json.loads((tmp_path / "all.json").read_text()) == found
     assert [path.name for path in tmp_path.iterdir()] == ["all.json"]
 
@@ -186,7 +231,11 @@ def test_folder_that_may_not_be_written_to_is_refused_before_all_work(run, tmp_p
 
     monkeypatch.setattr("pathlib.Path.touch", refuse)
     code, out, err, asked = run("--json", tmp_path / "all.json")
-    assert (code, out, asked) == (1, "", []) and err == f"crayonize: {tmp_path / 'all.json'}: Permission denied\n"
+    assert (code, out, asked) == (
+        1,
+        "",
+        [],
+    ) and err == f"crayonize: {tmp_path / 'all.json'}: Permission denied\n"
 
 
 def test_an_error_leaves_the_old_json(run, found, tmp_path, monkeypatch):

@@ -11,6 +11,7 @@ from PIL import Image
 
 from crayonize import cli, pipeline
 from crayonize.film import plan as timelapse
+from crayonize.film import view
 from crayonize.film import writers as film
 from crayonize.film.plan import Timelapse, pace
 from crayonize.images.icc import encode_srgb
@@ -31,7 +32,10 @@ def scribble():
     """Thirty strokes of all crayons that cross each other, some over the edge."""
     rng = np.random.default_rng(1)
     names = ("red", "yellow", "blue", "green", "black")
-    paths = [rng.uniform((-5, -5), (105, 65)) + np.cumsum(rng.normal(0, 10, (4, 2)), 0) for _ in range(30)]
+    paths = [
+        rng.uniform((-5, -5), (105, 65)) + np.cumsum(rng.normal(0, 10, (4, 2)), 0)
+        for _ in range(30)
+    ]
     strokes = tuple(stroke(path, names[i % 5]) for i, path in enumerate(paths))
     return Drawing(100.0, 60.0, "drawing", "box8", strokes)
 
@@ -61,7 +65,7 @@ def reduced(easel):
     return encode_srgb(easel.picture()).astype(int)
 
 
-# ---- the film and the drawing ----------------------------------------------------------------------------
+# ---- the film and the drawing --------------------------------------------------------------------
 
 
 def test_drawing_is_the_same_with_and_without_a_film(scribble, tmp_path):
@@ -130,7 +134,8 @@ def test_tip_is_seen_where_the_stroke_has_come_and_not_at_the_end(line, tmp_path
     middle = len(plain) // 2
     y, x = np.nonzero(np.abs(plain[middle] - shown[middle]).max(2))
     assert y.size > 10 and abs(x.min() - SIZE / 2) < SIZE / 8
-    assert y.min() >= 10 and y.max() > 18 and y.mean() > 14  # from the outline round the point, at 12, downwards
+    # from the outline round the point, at 12, downwards
+    assert y.min() >= 10 and y.max() > 18 and y.mean() > 14
     assert np.array_equal(plain[-1], shown[-1])
 
 
@@ -162,10 +167,12 @@ def test_pace_is_a_hands():
     assert start[1] - end[0] == pytest.approx(0.25)
 
 
-# ---- formats ---------------------------------------------------------------------------------------------
+# ---- formats -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix, off", [(".webp", 9), (".gif", 14), (".png", 0.01), (".apng", 0.01)])
+@pytest.mark.parametrize(
+    "suffix, off", [(".webp", 9), (".gif", 14), (".png", 0.01), (".apng", 0.01)]
+)
 def test_formats_have_the_length_and_end_with_the_drawing(scribble, tmp_path, suffix, off):
     path = tmp_path / f"film{suffix}"
     with Timelapse(path, 3) as watch:
@@ -195,7 +202,9 @@ def test_mp4_by_pyav(scribble, tmp_path):
 @pytest.mark.skipif(os.name != "posix", reason="a script stands in for the program")
 def test_mp4_by_ffmpeg(scribble, tmp_path, monkeypatch):
     program = tmp_path / "ffmpeg"
-    program.write_text(f"#!{sys.executable}\nimport sys\nopen(sys.argv[-1], 'wb').write(sys.stdin.buffer.read())\n")
+    program.write_text(
+        f"#!{sys.executable}\nimport sys\nopen(sys.argv[-1], 'wb').write(sys.stdin.buffer.read())\n"
+    )
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(film.importlib.util, "find_spec", lambda name: None)
@@ -203,7 +212,10 @@ def test_mp4_by_ffmpeg(scribble, tmp_path, monkeypatch):
         pipeline.draw(scribble, SIZE, watch=watch)
     assert (tmp_path / "film.mp4").stat().st_size == 30 * 72 * 120 * 3
     program.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('no such encoder')\n")
-    with pytest.raises(OSError, match="no such encoder"), Timelapse(tmp_path / "film.mp4", 3) as watch:
+    with (
+        pytest.raises(OSError, match="no such encoder"),
+        Timelapse(tmp_path / "film.mp4", 3) as watch,
+    ):
         pipeline.draw(scribble, SIZE, watch=watch)
 
 
@@ -229,7 +241,10 @@ def test_full_disk_is_told_and_leaves_nothing(line, tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space left") as caught, Timelapse(tmp_path / "film.gif", 3) as watch:
+    with (
+        pytest.raises(OSError, match="No space left") as caught,
+        Timelapse(tmp_path / "film.gif", 3) as watch,
+    ):
         pipeline.draw(line, SIZE, watch=watch)
     assert caught.value.filename == str(tmp_path / "film.gif") and list(tmp_path.iterdir()) == []
 
@@ -245,20 +260,33 @@ def test_broken_off_work_leaves_no_film(scribble, tmp_path):
 
 def test_colours_of_a_gif_are_near_all_that_can_appear(scribble):
     easel = pipeline.draw(scribble, SIZE)
-    palette = timelapse._colours(easel).astype(int)
+    palette = view.colours(easel).astype(int)
     assert 100 < len(palette) <= 255
     pixels = reduced(easel).reshape(-1, 3)[::7]
     nearest = np.abs(pixels[:, None] - palette).max(2).min(1)
     assert np.mean(nearest) < 20
 
 
-# ---- the command -----------------------------------------------------------------------------------------
+# ---- the command ---------------------------------------------------------------------------------
 
 
 def test_command_films_a_saved_drawing_and_adds_its_legend(scribble, tmp_path):
     save_drawing(scribble, tmp_path / "d.json")
-    words = ["draw", tmp_path / "d.json", tmp_path / "a.png", "--size", SIZE, "--timelapse", tmp_path / "a.gif",
-             "--seconds", "3", "--show-tip", "--legend", "--strokes", tmp_path / "a.svg"]  # fmt: skip
+    words = [
+        "draw",
+        tmp_path / "d.json",
+        tmp_path / "a.png",
+        "--size",
+        SIZE,
+        "--timelapse",
+        tmp_path / "a.gif",
+        "--seconds",
+        "3",
+        "--show-tip",
+        "--legend",
+        "--strokes",
+        tmp_path / "a.svg",
+    ]
     assert cli.main([str(word) for word in words]) == 0
     with Image.open(tmp_path / "a.png") as picture, Image.open(tmp_path / "a.gif") as moving:
         assert picture.width == SIZE and picture.height > 72 and moving.n_frames > 9
@@ -269,8 +297,16 @@ def test_command_films_a_photo(tmp_path):
     photo = np.full((40, 60, 3), 230, np.uint8)
     photo[10:30, 20:40] = (200, 40, 30)
     Image.fromarray(photo).save(tmp_path / "photo.png")
-    words = [tmp_path / "photo.png", tmp_path / "a.png", "--size", SIZE, "--timelapse", tmp_path / "a.png.webp",
-             "--seconds", "4"]  # fmt: skip
+    words = [
+        tmp_path / "photo.png",
+        tmp_path / "a.png",
+        "--size",
+        SIZE,
+        "--timelapse",
+        tmp_path / "a.png.webp",
+        "--seconds",
+        "4",
+    ]
     assert cli.main([str(word) for word in words]) == 0
     with Image.open(tmp_path / "a.png.webp") as moving, Image.open(tmp_path / "a.png") as picture:
         assert moving.n_frames > 20

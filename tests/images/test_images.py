@@ -1,4 +1,6 @@
-"""Pictures in and out: each file gives the right light or one clear line, and no output is ever half."""
+"""Pictures in and out: each file gives the right light or one clear line, and no output is ever
+half.
+"""
 
 import json
 import os
@@ -78,7 +80,9 @@ def png(width, height, depth, color_type, rows, *extra):
     """A PNG of raw rows (each led by its filter byte)."""
 
     def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        return (
+            struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        )
 
     header = struct.pack(">IIBBBBB", width, height, depth, color_type, 0, 0, 0)
     body = b"".join(chunk(*e) for e in extra) + chunk(b"IDAT", zlib.compress(rows))
@@ -93,16 +97,28 @@ def tiff(values, photometric=1, sample_format=1, bits=None, **more):
     """An uncompressed little-endian TIFF of one strip. more: tag_N=short value."""
     height, width, samples = values.shape
     bits = bits or values.dtype.itemsize * 8
-    tags = {256: width, 257: height, 259: 1, 262: photometric, 277: samples, 278: height, 279: values.nbytes}
+    tags = {
+        256: width,
+        257: height,
+        259: 1,
+        262: photometric,
+        277: samples,
+        278: height,
+        279: values.nbytes,
+    }
     tags |= {int(k[4:]): v for k, v in more.items()}
     at = 8 + 12 * (len(tags) + 3) + 6  # after the folder: bits, sample formats, pixels
     tags |= {258: bits, 339: sample_format, 273: at + 4 * samples}
     entries = b""
     for tag in sorted(tags):
         if tag in (258, 339) and samples > 2:
-            entries += struct.pack("<HHII", tag, 3, samples, at + (0 if tag == 258 else 2 * samples))
+            entries += struct.pack(
+                "<HHII", tag, 3, samples, at + (0 if tag == 258 else 2 * samples)
+            )
         elif tag in (258, 339):
-            entries += struct.pack("<HHI", tag, 3, samples) + struct.pack("<HH", tags[tag], tags[tag])
+            entries += struct.pack("<HHI", tag, 3, samples) + struct.pack(
+                "<HH", tags[tag], tags[tag]
+            )
         else:
             entries += struct.pack("<HHII", tag, 4, 1, tags[tag])
     folder = struct.pack("<H", len(tags)) + entries + struct.pack("<I", 0)
@@ -119,8 +135,19 @@ def icc(space, connection, **tags):
         body += data
     size = at + len(body)
     kind = b"prtr" if space == b"CMYK" else b"mntr"
-    header = struct.pack(">I4sI4s4s4s12x4s28x3I", size, b"test", 0x02400000, kind, space, connection, b"acsp",
-                         0xF6D6, 0x10000, 0xD32D)  # fmt: skip
+    header = struct.pack(
+        ">I4sI4s4s4s12x4s28x3I",
+        size,
+        b"test",
+        0x02400000,
+        kind,
+        space,
+        connection,
+        b"acsp",
+        0xF6D6,
+        0x10000,
+        0xD32D,
+    )
     return header.ljust(128, b"\0") + struct.pack(">I", len(tags)) + table + body
 
 
@@ -129,8 +156,15 @@ def fixed(*values):
 
 
 def rgb_profile(primaries, *curves):
-    columns = {f"{c}XYZ": b"XYZ \0\0\0\0" + fixed(*p) for c, p in zip("rgb", primaries, strict=True)}
-    return icc(b"RGB ", b"XYZ ", **columns, **{f"{c}TRC": t for c, t in zip("rgb", curves * 3, strict=False)})
+    columns = {
+        f"{c}XYZ": b"XYZ \0\0\0\0" + fixed(*p) for c, p in zip("rgb", primaries, strict=True)
+    }
+    return icc(
+        b"RGB ",
+        b"XYZ ",
+        **columns,
+        **{f"{c}TRC": t for c, t in zip("rgb", curves * 3, strict=False)},
+    )
 
 
 P3 = ((0.51512, 0.2412, -0.00105), (0.29198, 0.69225, 0.04189), (0.1571, 0.06657, 0.78407))
@@ -150,14 +184,18 @@ def test_decode_is_the_srgb_curve():
     assert np.allclose(decode_srgb(codes), srgb_light(codes), atol=1e-7)
     deep = np.arange(65536, dtype=np.uint16)
     assert np.allclose(decode_srgb(deep), srgb_light(deep, 65535), atol=1e-7)
-    assert np.allclose(decode_srgb(np.array([[0.0, 0.5, 1.0]])), srgb_light([[0, 0.5, 1]], 1), atol=1e-6)
+    assert np.allclose(
+        decode_srgb(np.array([[0.0, 0.5, 1.0]])), srgb_light([[0, 0.5, 1]], 1), atol=1e-6
+    )
     assert decode_srgb(codes).dtype == np.float32
 
 
 def test_encode_rounds_to_the_nearest_code_everywhere():
     light = np.linspace(-0.1, 1.1, 400_001).astype(np.float32)
     x = np.clip(light.astype(np.float64), 0, 1)
-    exact = 255 * np.where(x <= 0.04045 / 12.92, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+    exact = 255 * np.where(
+        x <= 0.04045 / 12.92, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055
+    )
     assert np.abs(encode_srgb(light) - exact).max() < 0.5 + 1e-4
     codes = np.arange(256, dtype=np.uint8).reshape(4, 64)
     assert np.array_equal(encode_srgb(decode_srgb(codes)), codes)
@@ -165,7 +203,10 @@ def test_encode_rounds_to_the_nearest_code_everywhere():
 
 def test_encode_is_exact_beside_each_edge():
     edges = srgb_light(np.arange(255) + 0.5).astype(np.float32)
-    above, below = np.nextafter(edges, 2).astype(np.float32), np.nextafter(edges, -1).astype(np.float32)
+    above, below = (
+        np.nextafter(edges, 2).astype(np.float32),
+        np.nextafter(edges, -1).astype(np.float32),
+    )
     assert np.array_equal(encode_srgb(above), np.arange(1, 256))
     assert np.array_equal(encode_srgb(edges), np.arange(1, 256))
     assert np.array_equal(encode_srgb(below), np.arange(255))
@@ -179,8 +220,12 @@ def test_encode_refuses_nan():
 
 
 def stored_for(upright, orientation):
-    """What a camera stores: orientation names the sides of the scene at which row 0 and column 0 lie."""
-    sides = "top left,top right,bottom right,bottom left,left top,right top,right bottom,left bottom"
+    """What a camera stores: orientation names the sides of the scene at which row 0 and column 0
+    lie.
+    """
+    sides = (
+        "top left,top right,bottom right,bottom left,left top,right top,right bottom,left bottom"
+    )
     rows, columns = sides.split(",")[orientation - 1].split()
     if rows in ("left", "right"):
         upright, swapped = upright.swapaxes(0, 1), True
@@ -292,7 +337,9 @@ def test_arrays_of_each_type():
     assert np.allclose(read_linear(deep), srgb_light(deep, 65535), atol=1e-6)
     assert np.allclose(read_linear(deep.astype(">u2")), srgb_light(deep, 65535), atol=1e-6)
     for kind in (np.float32, np.float64):
-        assert np.allclose(read_linear((deep / 65535).astype(kind)), srgb_light(deep, 65535), atol=1e-5)
+        assert np.allclose(
+            read_linear((deep / 65535).astype(kind)), srgb_light(deep, 65535), atol=1e-5
+        )
     assert np.allclose(read_linear(deep[::-1, ::2]), srgb_light(deep[::-1, ::2], 65535), atol=1e-6)
 
 
@@ -344,7 +391,9 @@ def test_grey_with_alpha_one_bit_and_palette(tmp_path):
     wanted = srgb_light(grey)[..., None] * alpha + np.array(ground) * (1 - alpha)
     assert np.allclose(read_linear(saved(tmp_path, la, "la.png"), ground=ground), wanted, atol=1e-5)
     bits = Image.fromarray(grey > 99)
-    assert np.array_equal(read_linear(saved(tmp_path, bits, "1.tif"))[..., 0], (grey > 99).astype(np.float32))
+    assert np.array_equal(
+        read_linear(saved(tmp_path, bits, "1.tif"))[..., 0], (grey > 99).astype(np.float32)
+    )
     palette = Image.fromarray(grey % 3, "L").convert("L")
     palette.putpalette([255, 0, 0, 0, 255, 0, 0, 0, 255])
     wanted = np.eye(3)[grey % 3]
@@ -363,7 +412,9 @@ def test_grey_with_alpha_one_bit_and_palette(tmp_path):
 def test_the_transparent_colour_of_a_png_is_the_ground(tmp_path, channels, deep):
     values = noise(8, 9, channels, dtype=np.uint16)
     stored = values if deep else values >> 8
-    rows = png_rows(stored) if deep else b"".join(b"\0" + r.astype(np.uint8).tobytes() for r in stored)
+    rows = (
+        png_rows(stored) if deep else b"".join(b"\0" + r.astype(np.uint8).tobytes() for r in stored)
+    )
     key = stored[2, 3].astype(">u2").tobytes()
     data = png(9, 8, 16 if deep else 8, 0 if channels == 1 else 2, rows, (b"tRNS", key))
     light = read_linear(placed(tmp_path, data, "k.png"), ground=(0.1, 0.2, 0.3))
@@ -392,7 +443,10 @@ def test_sixteen_bits_of_a_png_are_kept(tmp_path, color_type):
 def test_sixteen_bits_of_a_tiff_are_kept_and_turned_once(tmp_path, orientation):
     upright = noise(20, 30, 3, dtype=np.uint16)
     data = tiff(stored_for(upright, orientation), photometric=2, tag_274=orientation)
-    assert np.abs(read_linear(placed(tmp_path, data, "deep.tif")) - srgb_light(upright, 65535)).max() < 1e-6
+    assert (
+        np.abs(read_linear(placed(tmp_path, data, "deep.tif")) - srgb_light(upright, 65535)).max()
+        < 1e-6
+    )
 
 
 def test_a_layout_opencv_misreads_falls_back_to_eight_bits(tmp_path, monkeypatch):
@@ -422,7 +476,9 @@ def test_grey_tiffs_of_every_depth(tmp_path):
         )
     overbright = (ramp / 65535 * 1.5).astype("<f4")
     assert np.allclose(
-        light(tiff(overbright, sample_format=3)), srgb_light(np.minimum(overbright, 1), 1), atol=1e-4
+        light(tiff(overbright, sample_format=3)),
+        srgb_light(np.minimum(overbright, 1), 1),
+        atol=1e-4,
     )
     for bad in (np.nan, np.inf):
         broken = ramp.astype("<f4")
@@ -459,13 +515,17 @@ def test_cmyk_with_and_without_adobe_inversion(tmp_path, name):
 def test_first_frame_of_moving_pictures(tmp_path):
     frames = [Image.fromarray(np.full((8, 8, 3), v, np.uint8)) for v in (200, 10, 90)]
     for name in ("m.png", "m.webp", "m.avif", "m.tif"):
-        path = saved(tmp_path, frames[0], name, save_all=True, append_images=frames[1:], **best(name))
+        path = saved(
+            tmp_path, frames[0], name, save_all=True, append_images=frames[1:], **best(name)
+        )
         assert np.allclose(read_linear(path), srgb_light(200), atol=0.02), name
 
 
 def test_a_phone_jpeg_with_a_second_picture(tmp_path):
     frames = [Image.fromarray(np.full((8, 8, 3), v, np.uint8)) for v in (200, 10)]
-    path = placed(tmp_path, file_bytes(frames[0], "MPO", save_all=True, append_images=frames[1:]), "m.jpg")
+    path = placed(
+        tmp_path, file_bytes(frames[0], "MPO", save_all=True, append_images=frames[1:]), "m.jpg"
+    )
     assert np.allclose(read_linear(path), srgb_light(200), atol=0.02)
 
 
@@ -488,7 +548,9 @@ def test_profiles_agree_with_littlecms(tmp_path, primaries, curve):
 @pytest.mark.parametrize("suffix", [*SUFFIXES, ".avif"])
 def test_display_p3_red_in_every_format(tmp_path, suffix):
     red = Image.new("RGB", (16, 16), (200, 60, 50))
-    path = saved(tmp_path, red, f"r{suffix}", icc_profile=rgb_profile(P3, PARA_SRGB), **best(suffix))
+    path = saved(
+        tmp_path, red, f"r{suffix}", icc_profile=rgb_profile(P3, PARA_SRGB), **best(suffix)
+    )
     got = encode_srgb(read_linear(path))[8, 8].astype(int)
     assert np.abs(got - (218, 42, 38)).max() <= 4
 
@@ -515,11 +577,17 @@ def test_deep_pictures_keep_their_depth_under_a_profile(tmp_path):
     values = np.zeros((1, 600, 3), np.uint16)
     values[0, :, :] = np.arange(20000, 20600)[:, None]
     picture = png(
-        600, 1, 16, 2, png_rows(values), (b"iCCP", b"p\0\0" + zlib.compress(rgb_profile(ADOBE, GAMMA_22)))
+        600,
+        1,
+        16,
+        2,
+        png_rows(values),
+        (b"iCCP", b"p\0\0" + zlib.compress(rgb_profile(ADOBE, GAMMA_22))),
     )
     light = read_linear(placed(tmp_path, picture, "deep.png"))
     assert len(np.unique(light[..., 1])) > 500
-    assert np.allclose(light, (values / 65535) ** 2.19921875, atol=2e-4)  # the neutral axis stays neutral
+    # the neutral axis stays neutral
+    assert np.allclose(light, (values / 65535) ** 2.19921875, atol=2e-4)
 
 
 def test_grey_profile_and_grey_picture_under_an_rgb_profile(tmp_path):
@@ -530,7 +598,9 @@ def test_grey_profile_and_grey_picture_under_an_rgb_profile(tmp_path):
 
 
 def lut_profile(space, inputs):
-    """A profile of one 8-bit table: the inputs at its corners add up to darkness, with a red cast between."""
+    """A profile of one 8-bit table: the inputs at its corners add up to darkness, with a red cast
+    between.
+    """
     corners = b""
     for corner in range(2**inputs):
         ink = bin(corner).count("1") / inputs
@@ -592,10 +662,15 @@ def test_a_broken_profile_means_srgb(tmp_path, profile):
     assert light_from_profile(profile) is None
     values = noise(5, 6, 3)
     assert np.allclose(
-        read_linear(saved(tmp_path, values, "b.png", icc_profile=profile)), srgb_light(values), atol=1e-6
+        read_linear(saved(tmp_path, values, "b.png", icc_profile=profile)),
+        srgb_light(values),
+        atol=1e-6,
     )
     inks = Image.fromarray(noise(6, 7, 4), "CMYK")
-    plain, broken = saved(tmp_path, inks, "c.tif"), saved(tmp_path, inks, "d.tif", icc_profile=profile)
+    plain, broken = (
+        saved(tmp_path, inks, "c.tif"),
+        saved(tmp_path, inks, "d.tif", icc_profile=profile),
+    )
     assert np.array_equal(read_linear(plain), read_linear(broken))
 
 
@@ -671,10 +746,14 @@ def test_bombs_are_refused_before_decoding(tmp_path):
     assert before
     text = error_of(read_linear, placed(tmp_path, png(30000, 30000, 8, 2, b""), "bomb.png"))
     assert "30000 x 30000" in text and "bomb.png" in text
-    assert "2000000 x 1" in error_of(read_linear, placed(tmp_path, png(2_000_000, 1, 8, 0, b""), "long.png"))
+    assert "2000000 x 1" in error_of(
+        read_linear, placed(tmp_path, png(2_000_000, 1, 8, 0, b""), "long.png")
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # Pillow's own limit neither warns nor stops below ours
-        assert "cut short" in error_of(read_linear, placed(tmp_path, png(15000, 15000, 8, 2, b""), "big.png"))
+        assert "cut short" in error_of(
+            read_linear, placed(tmp_path, png(15000, 15000, 8, 2, b""), "big.png")
+        )
     assert before == Image.MAX_IMAGE_PIXELS
 
 
@@ -721,7 +800,9 @@ def test_heic_names_the_extra_and_works_with_it(tmp_path, monkeypatch):
     def register():
         monkeypatch.setitem(Image.OPEN, "HEIF", (FakeHeic, lambda start: start[4:8] == b"ftyp"))
 
-    monkeypatch.setitem(sys.modules, "pi_heif", types.SimpleNamespace(register_heif_opener=register))
+    monkeypatch.setitem(
+        sys.modules, "pi_heif", types.SimpleNamespace(register_heif_opener=register)
+    )
     assert np.array_equal(read_linear(path)[..., 0], [[1, 1], [0, 0]])
 
 
@@ -751,7 +832,12 @@ def test_same_picture_same_bytes(tmp_path, suffix, monkeypatch):
     profile = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
     profile[24:36] = bytes(range(12))  # as if written at another time
     monkeypatch.setattr(ImageCms.ImageCmsProfile, "tobytes", lambda _: bytes(profile))
-    write_image(tmp_path / f"b{suffix}", noise(20, 20, 3), settings=dict(reversed(SETTINGS.items())), dpi=150)
+    write_image(
+        tmp_path / f"b{suffix}",
+        noise(20, 20, 3),
+        settings=dict(reversed(SETTINGS.items())),
+        dpi=150,
+    )
     assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
 
@@ -877,7 +963,9 @@ def test_what_cannot_be_written_is_named_and_leaves_nothing(tmp_path, name, opti
 def test_wrong_arrays_and_sizes_are_refused(tmp_path):
     for wrong in (smooth().astype(np.float32), smooth()[..., :1], smooth()[..., 0], smooth()[:0]):
         assert "uint8 (h, w, 3)" in error_of(write_image, tmp_path / "out.png", wrong)
-    assert "16383" in error_of(write_image, tmp_path / "out.webp", np.zeros((1, 16384, 3), np.uint8))
+    assert "16383" in error_of(
+        write_image, tmp_path / "out.webp", np.zeros((1, 16384, 3), np.uint8)
+    )
     assert "65535" in error_of(write_image, tmp_path / "out.jpg", np.zeros((65536, 1, 3), np.uint8))
     write_image(tmp_path / "out.png", smooth()[::-1, ::2])
 

@@ -82,7 +82,9 @@ def test_folder_others_can_write_to_is_not_used(bare, monkeypatch, tmp_path, mod
     assert is_nowhere(cache.folder())
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may give a folder away")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may give a folder away"
+)
 def test_folder_of_somebody_else_is_not_used(bare, monkeypatch, tmp_path):
     (tmp_path / "theirs").mkdir(mode=0o700)
     os.chown(tmp_path / "theirs", 12345, -1)

@@ -48,7 +48,7 @@ def only_file(place):
     return path
 
 
-# ---- kernels ---------------------------------------------------------------------------------------------
+# ---- kernels -------------------------------------------------------------------------------------
 
 
 def test_second_process_loads_what_the_first_compiled(place):
@@ -99,7 +99,9 @@ def test_entry_that_cannot_be_replaced_is_no_error(place):
     assert not loads(place)
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EDQUOT], ids=errno.errorcode.get)
+@pytest.mark.parametrize(
+    "code", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EDQUOT], ids=errno.errorcode.get
+)
 def test_folder_that_cannot_be_written_is_no_error(place, monkeypatch, code):
     def refuse(*_):
         raise OSError(code, os.strerror(code))
@@ -134,7 +136,9 @@ def test_change_of_source_is_another_entry(place, monkeypatch):
 
 
 def test_source_hash_covers_the_kernels_called(monkeypatch, tmp_path):
-    """A kernel of another file that is called counts as source, its file and what it calls in turn."""
+    """A kernel of another file that is called counts as source, its file and what it calls in
+    turn.
+    """
     files = {"one": "from two import double", "two": "from three import once", "three": ""}
     body = "import numba\n@numba.njit\ndef {}(x):\n    return x\n"
     for (name, head), function in zip(files.items(), ("single", "double", "once"), strict=True):
@@ -163,10 +167,15 @@ def test_few_versions_of_a_kernel_are_kept(place, monkeypatch):
 def test_many_processes_start_at_once(tmp_path):
     """All draw the same on an empty cache, and leave it whole."""
     code = (
-        "from crayonize.machine import kernels; from crayonize.light import optics; kernels.keep_kernels();"
+        "from crayonize.machine import kernels; from crayonize.light import optics; "
+        "kernels.keep_kernels();"
         "import numpy as np; print(optics._over(*[np.float32(x) for x in (0.8, 0.3, 0.4)]))"
     )
-    environment = {**os.environ, "CRAYONIZE_CACHE": str(tmp_path / "shared"), "CRAYONIZE_NO_CACHE": ""}
+    environment = {
+        **os.environ,
+        "CRAYONIZE_CACHE": str(tmp_path / "shared"),
+        "CRAYONIZE_NO_CACHE": "",
+    }
     command, pipe = [sys.executable, "-c", code], subprocess.PIPE
     runs = [subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe) for _ in range(6)]
     said = {run.communicate() for run in runs}
@@ -189,14 +198,16 @@ def test_old_machines_are_forgotten_but_not_those_in_use(tmp_path):
     assert left == {"cache", "kernels-used", "kernels-0", "table.npz"}
 
 
-# ---- a numba with other inner names ----------------------------------------------------------------------
+# ---- a numba with other inner names --------------------------------------------------------------
 
 PRIVATE = ("Dispatcher", "compiler", "cpu_target", "rtsys", "serialize")
 
 
 @pytest.mark.parametrize("name", PRIVATE)
 def test_a_numba_without_one_of_its_inner_names_costs_only_the_cache(name, tmp_path):
-    """Hidden from our module alone, in a process where no kernel is loaded before: it computes the same."""
+    """Hidden from our module alone, in a process where no kernel is loaded before: it computes the
+    same.
+    """
     code = f"""
 import builtins
 def without(module, globals=None, locals=None, names=(), level=0, real=builtins.__import__):
@@ -211,7 +222,9 @@ import numpy as np
 print(float(optics._over(*[np.float32(x) for x in (0.8, 0.3, 0.4)])))
 """
     environment = {**os.environ, "CRAYONIZE_CACHE": str(tmp_path), "CRAYONIZE_NO_CACHE": ""}
-    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True
+    )
     assert run.returncode == 0, run.stderr
     assert float(run.stdout) == pytest.approx(optics._over.py_func(*ARGUMENTS), rel=1e-5)
 
@@ -219,6 +232,11 @@ print(float(optics._over(*[np.float32(x) for x in (0.8, 0.3, 0.4)])))
 def test_all_inner_names_that_are_used_are_tried():
     """Another private name of numba in kernels.py has to be added above."""
     tree = ast.parse(Path(kernels.__file__).read_text("utf-8"))
-    used = {name.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for name in node.names
-            if (node.module or "").startswith("numba.")}  # fmt: skip
+    used = {
+        name.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        for name in node.names
+        if (node.module or "").startswith("numba.")
+    }
     assert used == set(PRIVATE)

@@ -28,9 +28,15 @@ def made(drawing, size=500):
 
 
 def test_crayons_are_those_used_light_to_dark():
-    used = used_crayons(load_palette("box8"), {"black": 3.0, "yellow": 700.0, "red": 1.0, "blue": 0.0})
+    used = used_crayons(
+        load_palette("box8"), {"black": 3.0, "yellow": 700.0, "red": 1.0, "blue": 0.0}
+    )
     assert [one.crayon.name for one in used] == ["yellow", "red", "black"]
-    assert [one.amount for one in used] == ["14 mm of the stick", "0.1 mm of the stick", "0.1 mm of the stick"]
+    assert [one.amount for one in used] == [
+        "14 mm of the stick",
+        "0.1 mm of the stick",
+        "0.1 mm of the stick",
+    ]
 
 
 def test_wide_drawing_has_its_legend_below():
@@ -45,7 +51,9 @@ def test_high_drawing_has_its_legend_beside():
     assert np.array_equal(whole[:, : picture.shape[1]], picture)
 
 
-@pytest.mark.parametrize("crayons", [("red",), ("red", "yellow", "blue", "green", "brown", "black", "orange")])
+@pytest.mark.parametrize(
+    "crayons", [("red",), ("red", "yellow", "blue", "green", "brown", "black", "orange")]
+)
 def test_each_crayon_has_a_patch_of_its_colour(crayons):
     drawing = drawing_of(crayons, 100, 60)
     easel, picture, whole = made(drawing)
@@ -58,7 +66,10 @@ def test_each_crayon_has_a_patch_of_its_colour(crayons):
     for i, one in enumerate(used):
         x = legend.MARGIN + (i % across) * wide + legend.PATCH[0] / 2
         y = legend.MARGIN + legend.TITLE + (i // across) * legend.ENTRY[1] + legend.PATCH[1] / 2
-        part = panel[round((y - 2) * unit) : round((y + 2) * unit), round((x - 3) * unit) : round((x + 3) * unit)]
+        part = panel[
+            round((y - 2) * unit) : round((y + 2) * unit),
+            round((x - 3) * unit) : round((x + 3) * unit),
+        ]
         wanted = [int(one.crayon.hex[c : c + 2], 16) for c in (1, 3, 5)]
         near = np.abs(part.mean((0, 1)) - wanted).max()
         assert near < 70 and near < np.abs(252 - np.array(wanted)).max() / 2, one.crayon.name

@@ -1,4 +1,6 @@
-"""Pages to draw after: the outline first, then each crayon once, light to dark, on A4 with what was before pale."""
+"""Pages to draw after: the outline first, then each crayon once, light to dark, on A4 with what was
+before pale.
+"""
 
 import numpy as np
 import pytest
@@ -27,7 +29,9 @@ def fill(left, right, crayon, force=3.0):
     x = np.repeat(np.arange(left, right, 1.5), 2)
     y = np.tile([5, 55, 55, 5], -(-len(x) // 4))[: len(x)]
     path = WIDTH / 100 * np.stack([x, y], 1)
-    return Stroke(path.astype(np.float32), np.full(len(x), 4 * force, np.float32), crayon, Tip("blunt", 6.0))
+    return Stroke(
+        path.astype(np.float32), np.full(len(x), 4 * force, np.float32), crayon, Tip("blunt", 6.0)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +39,12 @@ def drawing():
     """A yellow and a blue half, a black line over both and a dab of red; dark crayons first."""
     path = np.array([[20, 60], [180, 70]], np.float32)
     line = Stroke(path, np.ones(2, np.float32), "black", Tip("sharp", 1.0), "line")
-    dab = Stroke(np.array([[140, 40]], np.float32), np.ones(1, np.float32), "red", Tip("blunt", 2.0))
-    return Drawing(WIDTH, HEIGHT, "drawing", "box8", (line, fill(50, 95, "blue"), dab, fill(5, 50, "yellow")))
+    dab = Stroke(
+        np.array([[140, 40]], np.float32), np.ones(1, np.float32), "red", Tip("blunt", 2.0)
+    )
+    return Drawing(
+        WIDTH, HEIGHT, "drawing", "box8", (line, fill(50, 95, "blue"), dab, fill(5, 50, "yellow"))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +52,9 @@ def pages(drawing, tmp_path_factory):
     """All pages as arrays, and the names of their files."""
     folder = tmp_path_factory.mktemp("pages") / "how to"
     files = save_steps(drawing, folder)
-    return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files], [file.name for file in files]
+    return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files], [
+        file.name for file in files
+    ]
 
 
 def test_steps_are_the_outline_and_each_crayon_light_to_dark(drawing):
@@ -57,7 +67,9 @@ def test_steps_are_the_outline_and_each_crayon_light_to_dark(drawing):
 
 def test_hints_tell_how_hard_to_press():
     def hint(force):
-        return steps_of(Drawing(WIDTH, HEIGHT, "drawing", "box8", (fill(5, 90, "red", force),)))[-1].hint
+        return steps_of(Drawing(WIDTH, HEIGHT, "drawing", "box8", (fill(5, 90, "red", force),)))[
+            -1
+        ].hint
 
     assert "lightly" in hint(0.8) and "firmly" in hint(3.0) and "hard" in hint(9.0)
 
@@ -86,7 +98,9 @@ def place(x_mm, y_mm):
     x = (297 - 100 * scale) / 2 + x_mm * scale
     y = steps.HEAD_MM + y_mm * scale
     dot = DPI / 25.4
-    return np.s_[round((y - 4) * dot) : round((y + 4) * dot), round((x - 4) * dot) : round((x + 4) * dot)]
+    return np.s_[
+        round((y - 4) * dot) : round((y + 4) * dot), round((x - 4) * dot) : round((x + 4) * dot)
+    ]
 
 
 def saturation(picture, where):
@@ -119,7 +133,9 @@ def test_pdf_has_all_pages_and_is_the_same_each_time(drawing, tmp_path):
 
 
 def test_names_of_png_pages(tmp_path):
-    dab = Stroke(np.array([[100, 150]], np.float32), np.ones(1, np.float32), "red", Tip("blunt", 2.0), "line")
+    dab = Stroke(
+        np.array([[100, 150]], np.float32), np.ones(1, np.float32), "red", Tip("blunt", 2.0), "line"
+    )
     high = Drawing(200.0, 280.0, "smooth", "box8", (dab,))
     files = save_steps(high, tmp_path / "fig.png")
     assert [file.name for file in files] == ["fig-01.png", "fig-02.png"]
@@ -127,7 +143,10 @@ def test_names_of_png_pages(tmp_path):
 
 
 def test_what_cannot_be_is_refused(drawing, tmp_path):
-    for out, words in ((tmp_path / "a.doc", ".pdf"), (tmp_path / "none" / "a.pdf", "does not exist")):
+    for out, words in (
+        (tmp_path / "a.doc", ".pdf"),
+        (tmp_path / "none" / "a.pdf", "does not exist"),
+    ):
         with pytest.raises(ValueError, match=words):
             save_steps(drawing, out)
     with pytest.raises(ValueError, match="no strokes"):
@@ -137,8 +156,13 @@ def test_what_cannot_be_is_refused(drawing, tmp_path):
 
 def test_command_makes_pages_from_lines_of_another_program(tmp_path, capsys):
     shape = '<rect x="10" y="10" width="60" height="30" fill="red"/><path stroke="blue" fill="none" d="M0 45H100"/>'
-    (tmp_path / "a.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 50">{shape}</svg>')
-    assert cli.main(["steps", str(tmp_path / "a.svg"), str(tmp_path / "a.pdf"), "--palette", "box8"]) == 0
+    (tmp_path / "a.svg").write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 50">{shape}</svg>'
+    )
+    assert (
+        cli.main(["steps", str(tmp_path / "a.svg"), str(tmp_path / "a.pdf"), "--palette", "box8"])
+        == 0
+    )
     assert (tmp_path / "a.pdf").read_bytes().count(b"/Type /Page\n") == 4
     assert cli.main(["steps", str(tmp_path / "a.svg"), str(tmp_path / "a.txt")]) == 2
     out, err = capsys.readouterr()

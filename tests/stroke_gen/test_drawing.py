@@ -29,7 +29,12 @@ def stroke(points: int = 5, seed: int = 0, **changes: Any) -> Stroke:
 
 
 def drawing(*strokes: Stroke, **changes: Any) -> Drawing:
-    fields: dict[str, Any] = {"width_mm": 297.0, "height_mm": 210.0, "paper": "smooth", "palette": "box24"}
+    fields: dict[str, Any] = {
+        "width_mm": 297.0,
+        "height_mm": 210.0,
+        "paper": "smooth",
+        "palette": "box24",
+    }
     return Drawing(**{**fields, "strokes": strokes, **changes})
 
 
@@ -59,10 +64,12 @@ VARIED = drawing(
 )
 
 
-# ---- round trip ------------------------------------------------------------------------------------------
+# ---- round trip ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("one", [VARIED, drawing(), drawing(stroke(), width_mm=250.0, height_mm=5000.0)])
+@pytest.mark.parametrize(
+    "one", [VARIED, drawing(), drawing(stroke(), width_mm=250.0, height_mm=5000.0)]
+)
 def test_what_is_saved_comes_back(tmp_path: Path, one: Drawing) -> None:
     save_drawing(one, tmp_path / "a.json")
     back = load_drawing(tmp_path / "a.json")
@@ -95,7 +102,9 @@ def test_largest_sheet_keeps_its_thousandths(tmp_path: Path) -> None:
     path = np.array([[9999.999, -4999.999], [8192.123, 10000]], np.float32)
     one = drawing(stroke(2, path_mm=path), width_mm=5000.0, height_mm=5000.0)
     save_drawing(one, tmp_path / "a.json")
-    np.testing.assert_allclose(load_drawing(tmp_path / "a.json").strokes[0].path_mm, path, rtol=0, atol=0.001)
+    np.testing.assert_allclose(
+        load_drawing(tmp_path / "a.json").strokes[0].path_mm, path, rtol=0, atol=0.001
+    )
 
 
 def test_point_at_the_very_limit_survives_the_rounding_of_the_sheet(tmp_path: Path) -> None:
@@ -115,7 +124,9 @@ def test_text_stream_is_read() -> None:
 
 
 def test_twenty_thousand_strokes_take_little_more_than_json_itself(tmp_path: Path) -> None:
-    """Against Python's own reader and writer in the same run, so that a busy machine changes nothing."""
+    """Against Python's own reader and writer in the same run, so that a busy machine changes
+    nothing.
+    """
     many = drawing(*[stroke(60, i % 50) for i in range(20_000)])
 
     def spent(function: Callable[..., Any], *given: Any) -> float:
@@ -139,7 +150,7 @@ def test_paths_are_packed_while_the_file_is_read(tmp_path: Path) -> None:
     assert peak < 6 * (tmp_path / "a.json").stat().st_size
 
 
-# ---- written by hand -------------------------------------------------------------------------------------
+# ---- written by hand -----------------------------------------------------------------------------
 
 HEAD: dict[str, Any] = {
     "format": "crayonize drawing",
@@ -182,7 +193,7 @@ def test_force_in_a_point_wins(as_text: bool) -> None:
     assert all(s.path_mm.tolist() == [[1, 2], [3, 4], [5, 6]] for s in one.strokes)
 
 
-# ---- what is wrong, and what would be right --------------------------------------------------------------
+# ---- what is wrong, and what would be right ------------------------------------------------------
 
 
 def bad(**changes: Any) -> dict[str, Any]:
@@ -205,12 +216,18 @@ MALFORMED: list[tuple[Any, str]] = [
     (by_hand(sheet_mm=[INF, 10]), "d.json: sheet_mm: inf is not a number from 1 to 5000 mm"),
     (by_hand(sheet_mm=["a", 10]), 'd.json: sheet_mm: "a" is not a number'),
     (by_hand(paper=3), "d.json: paper: 3 is not text"),
-    (by_hand(palette={"film_um": NAN}), "d.json: palette: not a JSON object of text and finite numbers"),
+    (
+        by_hand(palette={"film_um": NAN}),
+        "d.json: palette: not a JSON object of text and finite numbers",
+    ),
     (by_hand(physics=""), 'd.json: physics: "" is not text'),
     (by_hand(seed=-1), "d.json: seed: -1 is not a whole number from 0"),
     (by_hand(seed=1.5), "d.json: seed: 1.5 is not a whole number"),
     (by_hand(seed=10**30), "d.json: seed: a huge number is not"),
-    (by_hand(tip={"kind": "flat"}), 'd.json: tip: kind: "flat" is no kind of tip (valid: sharp, blunt'),
+    (
+        by_hand(tip={"kind": "flat"}),
+        'd.json: tip: kind: "flat" is no kind of tip (valid: sharp, blunt',
+    ),
     (by_hand(force=-1), "d.json: force: -1 is not a number from 0 to 100 N"),
     (by_hand(strokes={}), "d.json: strokes: an object is not a list"),
     (by_hand("red"), 'd.json: stroke 1: "red" is not an object with crayon, path'),
@@ -224,14 +241,26 @@ MALFORMED: list[tuple[Any, str]] = [
     (bad(note=None), "d.json: stroke 2 (red): note: nothing is not text"),
     (bad(path=[]), "d.json: stroke 2 (red): path: a list of 0 is not a list of points"),
     (bad(path="M 1 2"), 'd.json: stroke 2 (red): path: "M 1 2" is not a list of points'),
-    (bad(path=[[1, 2], 3]), "d.json: stroke 2 (red): path: point 2: 3 is not [x, y] or [x, y, force]"),
+    (
+        bad(path=[[1, 2], 3]),
+        "d.json: stroke 2 (red): path: point 2: 3 is not [x, y] or [x, y, force]",
+    ),
     (bad(path=[[1, 2, 3, 4]]), "stroke 2 (red): path: point 1: a list of 4 is not [x, y]"),
     (bad(path=[[1, 2], [3, "4"]]), 'stroke 2 (red): path: point 2: "4" is not a finite number'),
     (bad(path=[[1, True]]), "stroke 2 (red): path: point 1: true is not a finite number"),
-    (bad(path=[[1, 2], [None, 2]]), "stroke 2 (red): path: point 2: nothing is not a finite number"),
+    (
+        bad(path=[[1, 2], [None, 2]]),
+        "stroke 2 (red): path: point 2: nothing is not a finite number",
+    ),
     (bad(path=[[1, 2], [3, NAN]]), "stroke 2 (red): path: point 2: nan is not a finite number"),
-    (bad(path=[[1, 2, 1], [3, 4, -INF]]), "stroke 2 (red): path: point 2: -inf is not a finite number"),
-    (bad(path=[[1, 10**400]]), "stroke 2 (red): path: point 1: a huge number is not a finite number"),
+    (
+        bad(path=[[1, 2, 1], [3, 4, -INF]]),
+        "stroke 2 (red): path: point 2: -inf is not a finite number",
+    ),
+    (
+        bad(path=[[1, 10**400]]),
+        "stroke 2 (red): path: point 1: a huge number is not a finite number",
+    ),
     (bad(path=[[1, 2], [200.1, 2]]), "path: point 2: x = 200.1 is not from -100 to 200 mm"),
     (bad(path=[[1, -81]]), "path: point 1: y = -81 is not from -80 to 160 mm"),
     (bad(path=[[1, 1e300]]), "path: point 1: y = inf is not from -80 to 160 mm"),
@@ -241,13 +270,22 @@ MALFORMED: list[tuple[Any, str]] = [
     (bad(force=[1]), "stroke 2 (red): force: 1 numbers for 2 points"),
     (bad(force=[1, "2"]), 'stroke 2 (red): force: "2" is not a finite number'),
     (bad(force=[1, NAN]), "stroke 2 (red): force: nan is not a finite number"),
-    (bad(tip="blunt"), 'stroke 2 (red): tip: "blunt" is not an object with kind, width_mm, angle_deg'),
+    (
+        bad(tip="blunt"),
+        'stroke 2 (red): tip: "blunt" is not an object with kind, width_mm, angle_deg',
+    ),
     (bad(tip={"kind": "blnt"}), 'tip: kind: "blnt" is no kind of tip (did you mean "blunt"?)'),
     (bad(tip={"kind": []}), "stroke 2 (red): tip: kind: a list of 0 is no kind of tip"),
     (bad(tip={"width": 2}), 'tip: unknown key "width" (did you mean "width_mm"?)'),
-    (bad(tip={"width_mm": 0}), "stroke 2 (red): tip: width_mm: 0 is not a number from 0.1 to 200 mm"),
-    (bad(tip={"angle_deg": INF}), "stroke 2 (red): tip: angle_deg: inf is not a number from -360 to 360"),
-]  # fmt: skip
+    (
+        bad(tip={"width_mm": 0}),
+        "stroke 2 (red): tip: width_mm: 0 is not a number from 0.1 to 200 mm",
+    ),
+    (
+        bad(tip={"angle_deg": INF}),
+        "stroke 2 (red): tip: angle_deg: inf is not a number from -360 to 360",
+    ),
+]
 
 
 @pytest.mark.parametrize(("given", "part"), MALFORMED)
@@ -274,7 +312,9 @@ def test_malformed_drawing_is_named_in_one_line(given: Any, part: str, as_text: 
         (b"\xff\xfe{}", "not UTF-8"),
     ],
 )
-def test_file_that_is_no_drawing_is_named_in_one_line(tmp_path: Path, content: bytes, part: str) -> None:
+def test_file_that_is_no_drawing_is_named_in_one_line(
+    tmp_path: Path, content: bytes, part: str
+) -> None:
     path = tmp_path / "d.json"
     path.write_bytes(content)
     with pytest.raises(ValueError) as caught:
@@ -300,13 +340,16 @@ def test_too_many_strokes_points_or_characters_are_refused(monkeypatch: pytest.M
         load_drawing(io.StringIO(json.dumps(given)))
 
 
-# ---- saving ----------------------------------------------------------------------------------------------
+# ---- saving --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("wrong", "part"),
     [
-        (drawing(stroke(2, path_mm=np.zeros((2, 3), np.float32))), r"stroke 1 \(dark red\): path \(2, 3\)"),
+        (
+            drawing(stroke(2, path_mm=np.zeros((2, 3), np.float32))),
+            r"stroke 1 \(dark red\): path \(2, 3\)",
+        ),
         (drawing(stroke(2, force_n=np.ones(3, np.float32))), r"force \(3,\) are not of shapes"),
         (drawing(stroke(2, path_mm=np.full((2, 2), np.nan, np.float32))), "x = nan is not from"),
         (drawing(stroke(), stroke(crayon="")), "stroke 2: crayon"),

@@ -26,7 +26,9 @@ def test_the_part_lies_beside_the_target_and_names_our_process(tmp_path: Path) -
     assert (tmp_path / "a.webp").read_bytes() == b"new"
 
 
-def test_first_the_file_is_on_the_disk_then_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_first_the_file_is_on_the_disk_then_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A name on the disk without its content would be a torn picture after a loss of power."""
     seen = []
     fsync, replace = os.fsync, os.replace
@@ -53,7 +55,10 @@ def test_a_link_is_replaced_and_a_pipe_refused(tmp_path: Path) -> None:
     with whole_file(tmp_path / "link") as part:
         part.write_text("new")
     assert (tmp_path / "kept").read_text() == "kept" and (tmp_path / "link").read_text() == "new"
-    with pytest.raises(ValueError, match="stands for a folder or device"), whole_file(tmp_path / "pipe"):
+    with (
+        pytest.raises(ValueError, match="stands for a folder or device"),
+        whole_file(tmp_path / "pipe"),
+    ):
         pass
     with pytest.raises(ValueError, match="is no ordinary file"):
         read_bytes(tmp_path / "pipe", 10, "a file")

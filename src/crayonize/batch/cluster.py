@@ -1,7 +1,8 @@
 """The same jobs on a Dask cluster whose machines see the same folders.
 
-The cluster only carries jobs and outcomes. On each machine a crew of one worker draws, so that time limits,
-memory limits and crashes are what they are at home; a machine that is lost has its jobs done by another.
+The cluster only carries jobs and outcomes. On each machine a crew of one worker draws, so that time
+limits, memory limits and crashes are what they are at home; a machine that is lost has its jobs
+done by another.
 """
 
 import json
@@ -68,7 +69,8 @@ class Cluster:
         self._client = distributed.Client(address, timeout=_CONNECTING, set_as_default=False)
         self._hello: Message = {"recipe": _absolute_files(recipe).to_json(), "render": render}
         self._time_limit = time_limit
-        self._inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()  # futures that are done, or None to look up
+        # futures that are done, or None to look up
+        self._inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._stop_at: float | None = None
         self._whole = True  # nothing was lost or broken off
 
@@ -86,8 +88,12 @@ class Cluster:
             try:
                 future = self._inbox.get(timeout=1.0 if self._stop_at is None else 0.1)
             except queue.Empty:
-                lost_since = None if self._client.status == "running" else lost_since or time.monotonic()
-                if self._client.status == "closed" or (lost_since and time.monotonic() - lost_since > _LOST):
+                lost_since = (
+                    None if self._client.status == "running" else lost_since or time.monotonic()
+                )
+                if self._client.status == "closed" or (
+                    lost_since and time.monotonic() - lost_since > _LOST
+                ):
                     raise self._lost() from None
                 continue
             if future in pending:
@@ -121,7 +127,9 @@ class Cluster:
             return Outcome("died", "several machines or workers of the cluster died of it")
         except Exception as error:  # whatever a cluster of another version may raise
             lost = isinstance(error, OSError) or self._client.status != "running"
-            raise self._lost() if lost else CrewError(f"the cluster cannot draw: {error}") from error
+            raise (
+                self._lost() if lost else CrewError(f"the cluster cannot draw: {error}")
+            ) from error
 
     def _lost(self) -> CrewError:
         self._whole = False
@@ -142,7 +150,9 @@ class Cluster:
 
 
 def _absolute_files(recipe: Recipe) -> Recipe:
-    """The same recipe for someone who stands in another folder; one thread a job if nothing else is said."""
+    """The same recipe for someone who stands in another folder; one thread a job if nothing else is
+    said.
+    """
     changes: dict[str, Any] = {"threads": recipe.settings.threads or 1}
     for name in ("palette", "paper", "style"):
         value = getattr(recipe.settings, name)
@@ -155,4 +165,6 @@ def _absolute(job: Job) -> Job:
     """The same job for someone who stands in another folder."""
     source, target = job.photo.source, job.target
     photo = replace(job.photo, source=source if is_remote(source) else str(Path(source).absolute()))
-    return replace(job, photo=photo, target=target if is_remote(target) else str(Path(target).absolute()))
+    return replace(
+        job, photo=photo, target=target if is_remote(target) else str(Path(target).absolute())
+    )

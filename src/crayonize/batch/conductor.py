@@ -35,10 +35,11 @@ def run(
 ) -> int:
     """Draw all photos of folders or a list into a folder; returns the exit code.
 
-    render: "module:function" in place of `api.sketch`, for tests.   memory_limit: bytes for all workers, in
-    place of what the machine has. ValueError for what the caller can mend before anything is done, OSError if
-    the output folder cannot be used, ImportError for an extra that is missing. 0 all done, 1 stopped, 3 some
-    failed, 4 another run holds the folder, 128 + n stopped by signal n.
+    render: "module:function" in place of `api.sketch`, for tests.   memory_limit: bytes for all
+    workers, in place of what the machine has. ValueError for what the caller can mend before
+    anything is done, OSError if the output folder cannot be used, ImportError for an extra that is
+    missing. 0 all done, 1 stopped, 3 some failed, 4 another run holds the folder, 128 + n stopped
+    by signal n.
     """
     fields = _fields(recipe)
     check_template(options.name, fields)
@@ -69,14 +70,18 @@ def run(
         report.say(f"stopped: the report cannot be written ({error})")
         return 1
     except lock.Busy:
-        report.say(f"another run is at work in {output!r}; wait for its end, or choose another folder")
+        report.say(
+            f"another run is at work in {output!r}; wait for its end, or choose another folder"
+        )
         return 4
 
 
 def _fields(recipe: Recipe) -> dict[str, str]:
     """What a template for names may tell of the settings."""
     settings = asdict(recipe.settings)
-    return {field: Path(str(settings[field])).stem for field in ("palette", "paper", "style", "seed")}
+    return {
+        field: Path(str(settings[field])).stem for field in ("palette", "paper", "style", "seed")
+    }
 
 
 def _tell(plan: Plan, to_do: Sequence[Job], report: Report) -> int:
@@ -89,8 +94,14 @@ def _tell(plan: Plan, to_do: Sequence[Job], report: Report) -> int:
     return 0
 
 
-def _draw(crew: Workers, jobs: Iterator[Job | None], plan: Plan, folder: OutputFolder, journal: Journal,
-          report: Report) -> int:  # fmt: skip
+def _draw(
+    crew: Workers,
+    jobs: Iterator[Job | None],
+    plan: Plan,
+    folder: OutputFolder,
+    journal: Journal,
+    report: Report,
+) -> int:
     """Draw what is to be drawn, and account for every file."""
     code, reason = 0, ""
     try:
@@ -118,7 +129,9 @@ def _draw(crew: Workers, jobs: Iterator[Job | None], plan: Plan, folder: OutputF
 
 def _workers(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
              render: str | None, memory_limit: int | None) -> Workers:  # fmt: skip
-    """A cluster, or as many workers here as are asked for, or as there are cores and memory; none idle."""
+    """A cluster, or as many workers here as are asked for, or as there are cores and memory; none
+    idle.
+    """
     if options.dask:
         return Cluster(options.dask, recipe, render, options.time_limit)
     available = memory.available_bytes() if memory_limit is None else memory_limit
@@ -133,7 +146,9 @@ def _workers(options: Options, recipe: Recipe, folder: OutputFolder, jobs: int,
 
 @contextmanager
 def _stopped_by_signals(crew: Workers) -> Iterator[list[int]]:
-    """Let the first signal end the work soon and the second at once; yields the signals that came."""
+    """Let the first signal end the work soon and the second at once; yields the signals that
+    came.
+    """
     came: list[int] = []
 
     def stop(number: int, _: FrameType | None) -> None:
@@ -144,7 +159,9 @@ def _stopped_by_signals(crew: Workers) -> Iterator[list[int]]:
     before = {}
     with suppress(ValueError):  # not in the main thread: whoever is there will care
         before = {
-            number: signal.signal(number, stop) for name in names if (number := getattr(signal, name, None))
+            number: signal.signal(number, stop)
+            for name in names
+            if (number := getattr(signal, name, None))
         }
     try:
         yield came

@@ -1,11 +1,14 @@
-"""The crew: worker processes that draw, and the foreman here who hands out jobs and outlives every accident.
+"""The crew: worker processes that draw, and the foreman here who hands out jobs and outlives every
+accident.
 
-Each worker has one job at a time and pipes of its own, so that its death costs that one job and nobody
-else's. A reader thread a worker turns all that happens into events in one inbox; only the foreman acts on
-them. Time limits are kept here, by killing: nothing inside a worker that hangs could keep them. A worker
-asks for memory before it opens a photo and waits until there is enough.
+Each worker has one job at a time and pipes of its own, so that its death costs that one job and
+nobody else's. A reader thread a worker turns all that happens into events in one inbox; only the
+foreman acts on
+them. Time limits are kept here, by killing: nothing inside a worker that hangs could keep them. A
+worker asks for memory before it opens a photo and waits until there is enough.
 
-Messages are JSON lines: what a worker that has been taken over by a hostile photo sends is only ever data.
+Messages are JSON lines: what a worker that has been taken over by a hostile photo sends is only
+ever data.
 """
 
 import contextlib
@@ -28,7 +31,8 @@ from .memory import SHARE
 
 START_LIMIT = 300.0  # s for a worker to come up: its libraries may lie on a slow disk
 GRACE = 1.0  # s that pictures in work may still take after a stop
-RETRIES, RETRIES_IF_KILLED = 1, 2  # for a job whose worker died; a kill comes from outside, by chance twice
+# for a job whose worker died; a kill comes from outside, by chance twice
+RETRIES, RETRIES_IF_KILLED = 1, 2
 _KILLED = -9  # exit code of a worker ended by SIGKILL
 _STILLBORN = 3  # workers in a row that may die before they are ready
 _TICK = 1.0  # s between two looks at an idle source of jobs
@@ -80,13 +84,15 @@ class Crew:
     hello: Message
     time_limit: float
     memory: int | None = None  # bytes there are; several workers together take only a share of them
-    clean_up: Callable[[Job, int], None] = lambda job, pid: None  # called for the job of a killed worker
+    # called for the job of a killed worker
+    clean_up: Callable[[Job, int], None] = lambda job, pid: None
     _hands: list[_Hand] = field(default_factory=list)
     _inbox: "queue.SimpleQueue[tuple[_Hand | None, Message | None]]" = field(
         default_factory=queue.SimpleQueue
     )
     _waiting: deque[Job] = field(default_factory=deque)
-    _asking: dict[_Hand, int] = field(default_factory=dict)  # who waits for how many bytes, in order
+    # who waits for how many bytes, in order
+    _asking: dict[_Hand, int] = field(default_factory=dict)
     _deaths: dict[Job, int] = field(default_factory=dict)
     _stillborn: int = 0
     _stop_at: float | None = None
@@ -94,8 +100,8 @@ class Crew:
     def work(self, jobs: Iterator[Job | None]) -> Iterator[tuple[Job, Outcome]]:
         """Do the jobs and give what became of each, as it happens.
 
-        None among the jobs means: no job now, ask again in a second. After stop() no new job is begun,
-        and those that are not done by the end of the grace are given no outcome.
+        None among the jobs means: no job now, ask again in a second. After stop() no new job is
+        begun, and those that are not done by the end of the grace are given no outcome.
         ValueError if the workers refuse the recipe, CrewError if no worker can work at all.
         """
         exhausted = False
@@ -148,7 +154,8 @@ class Crew:
     def _hire(self) -> None:
         """Start a worker; if the system refuses, do with those there are.
 
-        -P: no module is taken from the folder we stand in. A process group of its own: Ctrl-C is for us.
+        -P: no module is taken from the folder we stand in. A process group of its own: Ctrl-C is
+        for us.
         """
         path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path if entry)
         try:
@@ -190,7 +197,9 @@ class Crew:
                 event = self._inbox.get_nowait()
 
     def _is_timed(self, hand: _Hand) -> bool:
-        """Whether a worker has something to do by a certain time; waiting for memory is none of its fault."""
+        """Whether a worker has something to do by a certain time; waiting for memory is none of its
+        fault.
+        """
         return (hand.job is not None or not hand.ready) and hand not in self._asking
 
     def _act(self, hand: _Hand | None, message: Message | None) -> Iterator[tuple[Job, Outcome]]:
@@ -215,7 +224,9 @@ class Crew:
                 yield from self._bury(hand)
 
     def _grant(self) -> None:
-        """Give memory to those who ask, first come first served; refuse what there will never be."""
+        """Give memory to those who ask, first come first served; refuse what there will never
+        be.
+        """
         for hand, asks in list(self._asking.items()):
             fits = self.memory is None or asks <= self.memory
             given = sum(other.holds for other in self._hands)
@@ -239,8 +250,14 @@ class Crew:
             if hand.job:
                 job = hand.job
                 self._dismiss(hand)
-                yield job, Outcome("timeout", f"not done within {self.time_limit:g} s (--time-limit)",
-                                   now - hand.started)  # fmt: skip
+                yield (
+                    job,
+                    Outcome(
+                        "timeout",
+                        f"not done within {self.time_limit:g} s (--time-limit)",
+                        now - hand.started,
+                    ),
+                )
             else:
                 yield from self._bury(hand)
 

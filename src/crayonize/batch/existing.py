@@ -14,7 +14,8 @@ class Existing:
 
     policy: str  # "auto", "skip", "overwrite" or "fail"
     journal: Journal
-    size: Callable[[Job], int | None]  # bytes of what stands at a job's target, None if there is nothing
+    # bytes of what stands at a job's target, None if there is nothing
+    size: Callable[[Job], int | None]
 
     def settle(self, job: Job) -> Job | Outcome:
         """The job if it is to be done, or why not."""
@@ -28,7 +29,9 @@ class Existing:
         return replace(job, strange=not self.journal.knows(job.out))
 
     def settle_all(self, plan: Plan) -> list[Job]:
-        """The jobs of a plan that are to be done; ValueError if there is a picture and must not be."""
+        """The jobs of a plan that are to be done; ValueError if there is a picture and must not
+        be.
+        """
         to_do = []
         for job in plan.jobs:
             settled = self.settle(job)

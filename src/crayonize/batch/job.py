@@ -54,21 +54,29 @@ class Recipe:
     settings: Settings
     light: bool = True  # shade the relief of paper and wax
     metadata: str = "safe"
-    page: str | None = None  # sheet of paper to fill, such as "a4"; None leaves the sheet of the settings
+    # sheet of paper to fill, such as "a4"; None leaves the sheet of the settings
+    page: str | None = None
     dpi: float | None = None
     max_pixels: int = MAX_PIXELS
     max_bytes: int = MAX_BYTES
 
     def digest(self, suffix: str) -> str:
-        """A short name for all that shapes a picture: with the same photo and digest it comes out the same.
+        """A short name for all that shapes a picture: with the same photo and digest it comes out
+        the same.
 
-        A palette, paper or style given as a file counts with its content, and so does the program itself: after
-        an upgrade that draws otherwise, a folder is drawn anew.
+        A palette, paper or style given as a file counts with its content, and so does the program
+        itself: after an upgrade that draws otherwise, a folder is drawn anew.
         """
         shaping = self.settings.plain()
         del shaping["threads"]
-        shaping |= {"light": self.light, "metadata": self.metadata, "page": self.page, "dpi": self.dpi,
-                    "suffix": suffix, "version": source.of_drawings()}  # fmt: skip
+        shaping |= {
+            "light": self.light,
+            "metadata": self.metadata,
+            "page": self.page,
+            "dpi": self.dpi,
+            "suffix": suffix,
+            "version": source.of_drawings(),
+        }
         files = self.settings.files()
         shaping["files"] = [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
         return hashlib.sha256(json.dumps(shaping, sort_keys=True).encode()).hexdigest()[:20]

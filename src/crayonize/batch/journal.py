@@ -1,8 +1,10 @@
 """The journal of an output folder: which picture was made from which photo with which settings.
 
-One JSON line is added after a picture stands whole at its name. A line counts as long as the photo, the
-recipe and the size of the picture are still those it tells of, wherever it stands in the file: so an
-interrupted run goes on where it was, and a changed photo is drawn anew. A torn line is passed over.
+One JSON line is added after a picture stands whole at its name. A line counts as long as the photo,
+the
+recipe and the size of the picture are still those it tells of, wherever it stands in the file: so
+an interrupted run goes on where it was, and a changed photo is drawn anew. A torn line is passed
+over.
 """
 
 import json
@@ -50,8 +52,14 @@ class Journal:
     def add(self, job: Job, size: int) -> None:
         """Note a picture that stands whole. OSError if the disk refuses the line."""
         photo = job.photo
-        entry = {"in": photo.place, "size": photo.size, "version": photo.version, "recipe": self._recipe,
-                 "out": job.out, "bytes": size}  # fmt: skip
+        entry = {
+            "in": photo.place,
+            "size": photo.size,
+            "version": photo.version,
+            "recipe": self._recipe,
+            "out": job.out,
+            "bytes": size,
+        }
         line = json.dumps(entry).encode() + b"\n"
         with open(self._file, "a+b", buffering=0) as file:
             if file.seek(0, os.SEEK_END):

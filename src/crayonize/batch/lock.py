@@ -14,7 +14,10 @@ class Busy(Exception):
 
 @contextmanager
 def held(folder: Path, shard: str | None = None) -> Iterator[None]:
-    """Hold a folder. With a shard ("2-of-8") other shards may work beside us, but no run for the whole."""
+    """Hold a folder.
+
+    With a shard ("2-of-8") other shards may work beside us, but no run for the whole.
+    """
     with open(folder / "lock", "a+b") as whole:
         _lock(whole, shared=shard is not None)
         if shard is None:

@@ -1,4 +1,7 @@
-"""What a user may choose for a batch. No heavy imports: the command line reads the defaults here."""
+"""What a user may choose for a batch.
+
+No heavy imports: the command line reads the defaults here.
+"""
 
 from dataclasses import dataclass
 

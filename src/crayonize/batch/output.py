@@ -1,4 +1,6 @@
-"""The output folder: who holds it, its journals, and the temporary files that a killed worker left."""
+"""The output folder: who holds it, its journals, and the temporary files that a killed worker
+left.
+"""
 
 import os
 import time
@@ -13,7 +15,8 @@ from .job import Job
 from .journal import Journal
 
 STATE = ".crayonize"  # folder of journals and locks
-_STALE = 3600.0  # s after which a temporary file that may belong to another machine is taken for left behind
+# s after which a temporary file that may belong to another machine is taken for left behind
+_STALE = 3600.0
 
 
 class OutputFolder:
@@ -26,7 +29,9 @@ class OutputFolder:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Make the folder if need be and hold it against other runs; lock.Busy if one is at work there."""
+        """Make the folder if need be and hold it against other runs; lock.Busy if one is at work
+        there.
+        """
         self._state.mkdir(parents=True, exist_ok=True)
         with lock.held(self._state, self._shard):
             yield
@@ -48,7 +53,9 @@ class OutputFolder:
             return None
 
     def sweep(self, jobs: Iterable[Job]) -> None:
-        """Remove what killed runs left behind; while other shards may be at work, only what is old."""
+        """Remove what killed runs left behind; while other shards may be at work, only what is
+        old.
+        """
         before = time.time() - _STALE if self._shard else None
         for folder in {os.path.dirname(job.target) for job in jobs}:
             _remove_parts(folder, PART, before)

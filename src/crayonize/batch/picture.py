@@ -17,7 +17,8 @@ from . import memory
 from .job import Job, Outcome, Recipe
 from .remote import SendError, local_copy
 
-Ask = Callable[[int], bool]  # wait until so many bytes of memory are free; False if they never will be
+# wait until so many bytes of memory are free; False if they never will be
+Ask = Callable[[int], bool]
 
 
 class OutputError(Exception):
@@ -28,7 +29,10 @@ class Studio:
     """Everything that is set up once and used for every photo."""
 
     def __init__(self, recipe: Recipe, render: str | None) -> None:
-        """render: "module:function" in place of `api.sketch`. ValueError for settings that are none."""
+        """render: "module:function" in place of `api.sketch`.
+
+        ValueError for settings that are none.
+        """
         self._recipe = recipe
         if render is None:
             from ..wax.physics import physics
@@ -42,14 +46,18 @@ class Studio:
             self._sketch = getattr(import_module(module), name)
 
     def make(self, job: Job, ask: Ask) -> Outcome:
-        """Draw the photo of a job. OutputError if this and every other picture cannot be written."""
+        """Draw the photo of a job.
+
+        OutputError if this and every other picture cannot be written.
+        """
         try:
             return self._make(job, ask)
         except ValueError as error:
             return Outcome("failed", str(error))
         except MemoryError:
             return Outcome(
-                "failed", "there is not enough memory for it; choose a smaller --size or fewer --jobs"
+                "failed",
+                "there is not enough memory for it; choose a smaller --size or fewer --jobs",
             )
         except OutputError:
             raise
@@ -58,7 +66,9 @@ class Studio:
         except OSError as error:
             return Outcome("failed", f"cannot be read ({error.strerror or error})")
         except Exception as error:  # one photo is never worth the others
-            return Outcome("failed", f"this should not have happened ({type(error).__name__}: {error})")
+            return Outcome(
+                "failed", f"this should not have happened ({type(error).__name__}: {error})"
+            )
 
     def _make(self, job: Job, ask: Ask) -> Outcome:
         if job.photo.size > self._recipe.max_bytes:
@@ -73,16 +83,23 @@ class Studio:
             settings, kept, needed = self._look_at(photo)
             if not ask(needed):
                 raise ValueError(
-                    f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it first"
+                    f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it "
+                    "first"
                 )
             if same_file(source, target):
-                raise ValueError("its picture would take its own place; choose another output folder")
+                raise ValueError(
+                    "its picture would take its own place; choose another output folder"
+                )
             if job.strange and not _is_ours(target):
-                raise ValueError(f"at {job.out!r} stands something that was not made here; see --existing")
+                raise ValueError(
+                    f"at {job.out!r} stands something that was not made here; see --existing"
+                )
             drawing, easel = self._sketch(photo, settings)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            api.finish(drawing, easel, target, light=self._recipe.light, settings=settings, kept=kept)
+            api.finish(
+                drawing, easel, target, light=self._recipe.light, settings=settings, kept=kept
+            )
         except OSError as error:
             if error.errno == errno.ENAMETOOLONG:
                 raise ValueError("the name of its picture is too long for this disk") from error
@@ -90,13 +107,16 @@ class Studio:
         return Outcome("ok", bytes=target.stat().st_size, strokes=len(drawing.strokes))
 
     def _look_at(self, photo: Photo) -> tuple[Settings, Exif | None, int]:
-        """Settings for this photo, tags to keep, and bytes of memory it will take, all by its header alone.
+        """Settings for this photo, tags to keep, and bytes of memory it will take, all by its
+        header alone.
 
         ValueError for a photo beyond the limits.
         """
         recipe, pixels = self._recipe, photo.width * photo.height
         if pixels > recipe.max_pixels:
-            raise ValueError(f"has {pixels} pixels; the limit is {recipe.max_pixels} (--max-pixels)")
+            raise ValueError(
+                f"has {pixels} pixels; the limit is {recipe.max_pixels} (--max-pixels)"
+            )
         settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, photo.width, photo.height)
         kept = metadata.kept(photo.picture, recipe.metadata)
         return settings, kept, memory.need(photo.decoding, settings.size, settings.preview)

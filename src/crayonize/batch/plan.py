@@ -1,4 +1,7 @@
-"""What is to be done: which photos are meant, and where each picture goes. Nothing is written here."""
+"""What is to be done: which photos are meant, and where each picture goes.
+
+Nothing is written here.
+"""
 
 import glob
 import os
@@ -53,13 +56,17 @@ class Planner:
     def job(self, photo: Found) -> Job | str:
         """The job for a photo, or the path of the photo that has its place already."""
         out = self._out(photo)
-        return self._places.take(out, photo.source) or Job(photo, out, os.path.join(self._output, out))
+        return self._places.take(out, photo.source) or Job(
+            photo, out, os.path.join(self._output, out)
+        )
 
     def _out(self, photo: Found) -> str:
         return picture_name(photo.place, self._template, self._suffix, self._fields)
 
     def _is_ours(self, place: str) -> bool:
-        """Whether a photo belongs to our shard, by its place alone: whatever else comes or goes beside it."""
+        """Whether a photo belongs to our shard, by its place alone: whatever else comes or goes
+        beside it.
+        """
         if self._shard is None:
             return True
         part, parts = self._shard
@@ -67,13 +74,16 @@ class Planner:
 
 
 def sources(inputs: Sequence[str]) -> list[str]:
-    """The folders and files that are meant, each once. What no shell has replaced (*.jpg) is replaced here.
+    """The folders and files that are meant, each once. What no shell has replaced (*.jpg) is
+    replaced here.
 
     ValueError for what is not there.
     """
     paths: dict[str, str] = {}
     for given in inputs:
-        matches = [given] if is_remote(given) or os.path.lexists(given) else sorted(glob.glob(given))
+        matches = (
+            [given] if is_remote(given) or os.path.lexists(given) else sorted(glob.glob(given))
+        )
         if not matches:
             raise ValueError(f"{given!r}: there is no such file or folder")
         for path in matches:
@@ -82,7 +92,10 @@ def sources(inputs: Sequence[str]) -> list[str]:
 
 
 def entries(paths: Sequence[str]) -> Iterator[Entry]:
-    """All entries of the sources. One folder is mirrored itself; one among several under its own name."""
+    """All entries of the sources.
+
+    One folder is mirrored itself; one among several under its own name.
+    """
     for path in paths:
         own_name = os.path.basename(_full(path))
         if not (is_remote(path) or os.path.isdir(path)):
@@ -115,28 +128,38 @@ def _named_file(path: str, place: str) -> Entry:
 
 
 def check_apart(paths: Sequence[str], output: str, jobs: Sequence[Job]) -> None:
-    """ValueError if pictures would land among the photos, by whatever links, or in the place of one."""
+    """ValueError if pictures would land among the photos, by whatever links, or in the place of
+    one.
+    """
     if is_remote(output):
         _check_urls_apart(paths, output)
         return
     paths = [path for path in paths if not is_remote(path)]
     folders = [path for path in paths if os.path.isdir(path)]
     files = [path for path in paths if path not in folders]
-    photos = {folded(os.path.realpath(path)) for path in files} | {folded(_place(path)) for path in files}
+    photos = {folded(os.path.realpath(path)) for path in files} | {
+        folded(_place(path)) for path in files
+    }
     for path in folders:
         if _lies_in(output, path) or _lies_in(path, output):
             raise ValueError(
                 f"{output!r} and {path!r} lie in one another; photos and pictures need two folders"
             )
-    places = {target: os.path.realpath(target) for target in {os.path.dirname(job.target) for job in jobs}}
+    places = {
+        target: os.path.realpath(target) for target in {os.path.dirname(job.target) for job in jobs}
+    }
     for target in places:
         for path in folders:
             if os.path.lexists(target) and _lies_in(target, path):
-                raise ValueError(f"{target!r} leads into {path!r}, where the photos are; remove that link")
+                raise ValueError(
+                    f"{target!r} leads into {path!r}, where the photos are; remove that link"
+                )
     for job in jobs if photos else ():
         place = os.path.join(places[os.path.dirname(job.target)], os.path.basename(job.target))
         if folded(place) in photos:
-            raise ValueError(f"the picture of {job.photo.name!r} would be written over a photo, {place!r}")
+            raise ValueError(
+                f"the picture of {job.photo.name!r} would be written over a photo, {place!r}"
+            )
 
 
 def _check_urls_apart(paths: Sequence[str], output: str) -> None:

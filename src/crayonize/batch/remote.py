@@ -1,8 +1,9 @@
-"""Remote folders: s3:// and whatever else fsspec knows. Photos are fetched and pictures sent one by one.
+"""Remote folders: s3:// and whatever else fsspec knows. Photos are fetched and pictures sent one by
+one.
 
-What is local is done on a copy in a temporary folder of the worker, under the same limits as everything.
-There is no lock on a remote folder; a picture appears there whole or not at all if the service keeps to that,
-as object stores do.
+What is local is done on a copy in a temporary folder of the worker, under the same limits as
+everything. There is no lock on a remote folder; a picture appears there whole or not at all if the
+service keeps to that, as object stores do.
 """
 
 import os
@@ -30,7 +31,16 @@ _STORES = {
     "az",
 }  # know no folders; to make one would make a bucket
 _SAVE_EVERY = 30.0  # s between two copies of the journal to the remote folder
-_VERSIONS = ("ETag", "etag", "md5Hash", "mtime", "LastModified", "last_modified", "updated", "created")
+_VERSIONS = (
+    "ETag",
+    "etag",
+    "md5Hash",
+    "mtime",
+    "LastModified",
+    "last_modified",
+    "updated",
+    "created",
+)
 
 
 class SendError(Exception):
@@ -63,7 +73,9 @@ def scan(url: str) -> Iterator[Entry]:
         elif not is_picture(name):
             yield name, Outcome("ignored", "no picture, by the end of its name")
         else:
-            yield Found(name, name, system.unstrip_protocol(path), int(info["size"]), _version(info))
+            yield Found(
+                name, name, system.unstrip_protocol(path), int(info["size"]), _version(info)
+            )
 
 
 def _version(info: dict[str, Any]) -> str:
@@ -74,7 +86,8 @@ def _version(info: dict[str, Any]) -> str:
 def lie_in_one_another(one: str, other: str) -> bool:
     """Whether one URL names a folder in the other, or both the same."""
     names = [
-        f"{system.unstrip_protocol(path).rstrip('/')}/" for system, path in map(file_system, (one, other))
+        f"{system.unstrip_protocol(path).rstrip('/')}/"
+        for system, path in map(file_system, (one, other))
     ]
     return names[0].startswith(names[1]) or names[1].startswith(names[0])
 
@@ -112,7 +125,9 @@ def send(path: str, url: str) -> None:
     """Copy a local file to a URL. SendError if that is refused."""
     system, name = file_system(url)
     try:
-        if not _STORES & set(system.protocol if isinstance(system.protocol, tuple) else (system.protocol,)):
+        if not _STORES & set(
+            system.protocol if isinstance(system.protocol, tuple) else (system.protocol,)
+        ):
             system.makedirs(str(PurePosixPath(name).parent), exist_ok=True)
         system.put_file(path, name)
     except OSError as error:
@@ -126,7 +141,9 @@ def remove_copies(pid: int) -> None:
 
 
 class RemoteFolder(OutputFolder):
-    """An output folder of which only the journal is also here, to be sent now and then and at the end."""
+    """An output folder of which only the journal is also here, to be sent now and then and at the
+    end.
+    """
 
     def __init__(self, url: str, shard: tuple[int, int] | None, recipe: str) -> None:
         self._here = tempfile.TemporaryDirectory(prefix=f"{_PREFIX}{os.getpid()}-")

@@ -1,7 +1,8 @@
-"""What is told of a batch: a line a file, a bar that moves, and at the end an account of every file.
+"""What is told of a batch: a line a file, a bar that moves, and at the end an account of every
+file.
 
-Lines for programs go to stdout as JSON, all else to stderr. Names may hold any bytes: in JSON those that are
-no UTF-8 stand as \\xff escapes, and the exact name follows in base64.
+Lines for programs go to stdout as JSON, all else to stderr. Names may hold any bytes: in JSON those
+that are no UTF-8 stand as \\xff escapes, and the exact name follows in base64.
 """
 
 import base64
@@ -71,7 +72,9 @@ class Report:
         self.counts[outcome.status] += 1
         if self._json:
             line: dict[str, Any] = (
-                _named("in", name) | (_named("out", out) if out else {}) | {"status": outcome.status}
+                _named("in", name)
+                | (_named("out", out) if out else {})
+                | {"status": outcome.status}
             )
             if outcome.status == "ok":
                 line |= {"strokes": outcome.strokes, "bytes": outcome.bytes}
@@ -100,7 +103,11 @@ class Report:
         if self._json:
             line: dict[str, Any] = {"end": "stopped" if reason else "finished", "exit_code": code}
             line |= {"reason": reason} if reason else {}
-            line |= {"total": self.counts.total(), "counts": dict(self.counts), "seconds": round(seconds, 3)}
+            line |= {
+                "total": self.counts.total(),
+                "counts": dict(self.counts),
+                "seconds": round(seconds, 3),
+            }
             _print(json.dumps(line | ({"in_other_shards": elsewhere} if elsewhere else {})))
         told = [f"{n} {status.replace('_', ' ')}" for status, n in self.counts.items() if n]
         shards = f"; {elsewhere} in other shards" if elsewhere else ""
@@ -126,7 +133,8 @@ def _print(line: str) -> None:
     try:
         print(line, flush=True)
     except OSError as error:
-        with contextlib.suppress(OSError):  # or what is still in its buffer would fail again at the end
+        # or what is still in its buffer would fail again at the end
+        with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise ReportError(error.strerror) from error
 

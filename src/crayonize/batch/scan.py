@@ -1,6 +1,7 @@
 """Which files of a folder are photos: regular files with the suffix of a picture, in a fixed order.
 
-Links are not followed, so nothing is taken twice, no loop is walked and nothing outside the folder is read.
+Links are not followed, so nothing is taken twice, no loop is walked and nothing outside the folder
+is read.
 Every entry is reported: what is no photo comes out as an Outcome with the reason.
 """
 
@@ -30,7 +31,10 @@ def scan(root: str) -> Iterator[Entry]:
             with os.scandir(os.path.join(root, inside)) as listing:
                 entries = sorted(listing, key=lambda entry: os.fsencode(entry.name))
         except OSError as error:
-            yield inside or ".", Outcome("failed", f"the folder cannot be listed ({error.strerror})")
+            yield (
+                inside or ".",
+                Outcome("failed", f"the folder cannot be listed ({error.strerror})"),
+            )
             continue
         deeper = []
         for entry in entries:
@@ -65,7 +69,9 @@ def _look(entry: os.DirEntry[str], name: str) -> Entry:
 
 
 def is_picture(name: str) -> bool:
-    """Whether a name ends like that of a picture we read; what it holds is seen when it is opened."""
+    """Whether a name ends like that of a picture we read; what it holds is seen when it is
+    opened.
+    """
     return PurePosixPath(name).suffix.lower() in SUFFIXES
 
 

@@ -1,6 +1,8 @@
-"""A folder under watch: a photo is drawn once it has stopped growing, and again whenever it has changed.
+"""A folder under watch: a photo is drawn once it has stopped growing, and again whenever it has
+changed.
 
-By looking, not by notices of the system: these come in the midst of writing, and never from network disks.
+By looking, not by notices of the system: these come in the midst of writing, and never from network
+disks.
 """
 
 import time
@@ -24,11 +26,15 @@ class Watch:
                  tell: Callable[[str, Outcome], None]) -> None:  # fmt: skip
         """look: lists the entries of the folders.   tell: takes what becomes no job."""
         self._look, self._planner, self._existing, self._tell = look, planner, existing, tell
-        self._since: dict[str, tuple[Stamp, float]] = {}  # photo -> its stamp, when that was first seen
+        # photo -> its stamp, when that was first seen
+        self._since: dict[str, tuple[Stamp, float]] = {}
         self._taken: dict[str, Stamp] = {}
 
     def jobs(self, known: Iterable[Found]) -> Iterator[Job | None]:
-        """Jobs for ever, None while there is nothing to do. known: photos that need not be drawn."""
+        """Jobs for ever, None while there is nothing to do.
+
+        known: photos that need not be drawn.
+        """
         self._taken = {photo.source: (photo.size, photo.version) for photo in known}
         while True:
             yield from self._settled()

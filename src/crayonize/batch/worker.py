@@ -1,7 +1,9 @@
-"""A worker process: hears the recipe, then draws one photo after another until nobody listens any more.
+"""A worker process: hears the recipe, then draws one photo after another until nobody listens any
+more.
 
-Started by the crew with two pipes. It dies with the crew: at once where the system offers that, and else when
-its pipe ends. Nothing of a photo is opened before the crew has granted the memory it will take.
+Started by the crew with two pipes. It dies with the crew: at once where the system offers that, and
+else when its pipe ends. Nothing of a photo is opened before the crew has granted the memory it will
+take.
 """
 
 import contextlib
@@ -47,7 +49,9 @@ class _Line:
         os._exit(0)
 
     def hear(self) -> Message:
-        """The next message; the end if none comes for long: on a cluster nobody may be left to send one."""
+        """The next message; the end if none comes for long: on a cluster nobody may be left to send
+        one.
+        """
         try:
             return self._messages.get(timeout=_IDLE)
         except queue.Empty:

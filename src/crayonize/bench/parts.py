@@ -1,11 +1,8 @@
-"""How fast it is on this machine: what `crayonize bench` measures, and the table it prints.
+"""The parts of the benchmark, each run in a process of its own: `python -m crayonize.bench.parts
+PART ARGUMENTS`.
 
-Each part runs in a process of its own (`python -m crayonize.bench.parts PART ARGUMENTS`), so that none finds memory
-or caches as another has left them, and each figure is the best of a few runs. The photo is made here. A
-cell-step is one cell under the tip at one contact; tips are 24 cells wide.
-
-Whole drawings are also set against two yardsticks timed in the same run: the same kernels uncompiled, on a few
-short strokes, and OpenCV's oilPainting and stylization on the same photo. Such ratios hold on other machines too.
+So none finds memory or caches as another has left them. The photo is made here. A cell-step is one
+cell under the tip at one contact; tips are 24 cells wide.
 """
 
 import json
@@ -13,7 +10,6 @@ import math
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -21,7 +17,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..machine import cores
 
 if TYPE_CHECKING:
@@ -29,50 +24,12 @@ if TYPE_CHECKING:
 
     from ..pipeline import Easel
 
-SIZES_MP = (1.0, 4.0, 16.0)  # sheets; with --quick without the last
-REPEATS = 3
 CELL_MM = 297 / 1600  # of all sheets: larger pictures are drawn on larger sheets
 TIP_CELLS = 24
 FORCE_N_MM2 = 0.38  # a firm stroke
-LIVE_SIZES = (1600, 3508)  # A4 as usual, and at 300 dpi
 STAGES = ("reading", "paper", "planning", "simulation", "looking", "rendering", "writing")
 
 Figures = dict[str, Any]
-
-
-def measure(quick: bool = False, progress: Callable[[str, float], None] | None = None) -> Figures:
-    """All figures, as JSON holds them: in seconds, unless their name says otherwise.
-
-    quick: without the largest sheet, the cold start, and repetition.
-    """
-    sizes, repeats = (SIZES_MP[:-1], 1) if quick else (SIZES_MP, REPEATS)
-    with tempfile.TemporaryDirectory() as folder:
-        parts: dict[str, Callable[[], Any]] = {
-            "machine": partial(_child, "machine"),
-            "start": partial(_starts, folder, repeats, cold=not quick),
-            "cell_steps_per_second": partial(_child, "rubbing", 1000, repeats),
-            "sheets": lambda: [],
-            **{f"{mp:g} MP": partial(_child, "sheet", mp, folder, repeats) for mp in sizes},
-            "threads": partial(_child, "threads", sizes[1], folder, repeats),
-            "live_ms": lambda: {str(size): _child("live", size, 200) for size in LIVE_SIZES},
-            "yardsticks": partial(_yardsticks, sizes[0], folder, repeats),
-        }
-        found: Figures = {"crayonize": __version__, "quick": quick}
-        for number, (name, part) in enumerate(parts.items()):
-            if progress:
-                progress(name.replace("_", " "), number / len(parts))
-            found[name] = part()
-    found["sheets"] = [found.pop(f"{mp:g} MP") for mp in sizes]
-    found["ratios"] = _ratios(found)
-    return found
-
-
-def table(found: Figures) -> str:
-    """The figures for people to read."""
-    return "\n".join(_lines(found))
-
-
-# ---- the parts, each in a process of its own -------------------------------------------------------------
 
 
 def machine() -> Figures:
@@ -83,13 +40,21 @@ def machine() -> Figures:
     import numba
     import numpy as np
 
-    return {"cpu": _cpu(), "cores": cores.allowed(), "system": platform.platform(terse=True),
-            "python": platform.python_version(), "numpy": np.__version__, "numba": numba.__version__,
-            "cv2": cv2.__version__}  # fmt: skip
+    return {
+        "cpu": _cpu(),
+        "cores": cores.allowed(),
+        "system": platform.platform(terse=True),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "cv2": cv2.__version__,
+    }
 
 
 def photo(path: str, megapixels: float) -> None:
-    """Write a picture that has what photos have: a sky, a sun, hills, a meadow, things with edges, and grain."""
+    """Write a picture that has what photos have: a sky, a sun, hills, a meadow, things with edges,
+    and grain.
+    """
     import cv2
     import numpy as np
 
@@ -107,26 +72,36 @@ def photo(path: str, megapixels: float) -> None:
     picture[np.hypot(x - 0.95, y - 0.62) < 0.13] = 36, 84, 40
     for cells in (24, 160):  # patches of light and shade, and blades of grass
         patches = rng.normal(0, 1, (cells, 3 * cells // 2)).astype(np.float32)
-        picture *= 1 + 0.1 * y[..., None] * cv2.resize(patches, (wide, high), interpolation=cv2.INTER_CUBIC)[..., None]
+        picture *= (
+            1
+            + 0.1
+            * y[..., None]
+            * cv2.resize(patches, (wide, high), interpolation=cv2.INTER_CUBIC)[..., None]
+        )
     picture += rng.normal(0, 3, (high, wide, 1)).astype(np.float32)
     write_image(path, np.clip(picture, 0, 255).astype(np.uint8))
 
 
 def rubbing(side: int, repeats: int) -> Figures:
-    """Cell-steps per second of one thread, with and without smearing, on a sheet of side x side cells."""
+    """Cell-steps per second of one thread, with and without smearing, on a sheet of side x side
+    cells.
+    """
     return {
-        name: max(_rubbed(side, smears) for _ in range(repeats + 1))  # the first one loads the kernels
+        # the first one loads the kernels
+        name: max(_rubbed(side, smears) for _ in range(repeats + 1))
         for name, smears in (("smearing", True), ("without_smearing", False))
     }
 
 
 def sheet(megapixels: float, folder: str, repeats: int) -> Figures:
-    """Seconds per megapixel of each stage from photo to picture, and the memory a cell takes at most."""
+    """Seconds per megapixel of each stage from photo to picture, and the memory a cell takes at
+    most.
+    """
     from stroke_gen.drawing_file import save_drawing
 
     given, small = Path(folder) / f"{megapixels:g}.jpg", Path(folder) / "small.jpg"
     for path, mp in ((given, megapixels), (small, 0.01)):
-        _child("photo", str(path), mp)
+        child("photo", str(path), mp)
     _staged(small, 0.01)  # loads the kernels
     before = _peak_bytes()
     seconds, drawing = _staged(given, megapixels)
@@ -153,7 +128,7 @@ def threads(megapixels: float, folder: str, repeats: int) -> Figures:
 
     def drawn(number: int) -> float:
         stand = api.workshop().easel(drawing, _sides(megapixels)[0], number)
-        return _seconds(lambda: stand.draw(drawing.strokes))
+        return seconds_of(lambda: stand.draw(drawing.strokes))
 
     _rubbed(100, True)  # loads the kernels
     seconds = {str(n): min(drawn(n) for _ in range(repeats)) for n in counts}
@@ -177,7 +152,7 @@ def live(size: int, moves: int) -> Figures:
             hand.press(x, y, 2.0, ("red", "blue", "yellow")[number // 10 % 3], tip)
         way += rng.normal(0, 0.3)
         x, y = x + 20 * cell_mm * math.cos(way), y + 20 * cell_mm * math.sin(way)
-        took.append(1000 * _seconds(partial(hand.move, x, y, 2.0)))
+        took.append(1000 * seconds_of(partial(hand.move, x, y, 2.0)))
         if number % 10 == 9:
             hand.lift()
     return {"min": min(took), "median": float(np.median(took)), "max": max(took)}
@@ -190,7 +165,9 @@ def strokes(repeats: int) -> float:
 
     def drawn() -> float:
         stand = _blank(side)
-        return _seconds(partial(stand.draw, [_stroke(line, stand, i) for i, line in enumerate(lines)]))
+        return seconds_of(
+            partial(stand.draw, [_stroke(line, stand, i) for i, line in enumerate(lines)])
+        )
 
     return min(drawn() for _ in range(repeats))
 
@@ -199,23 +176,26 @@ def filters(path: str, repeats: int) -> Figures:
     """Seconds that OpenCV takes for its two nearest relatives."""
     import cv2
 
-    picture = cv2.cvtColor(cv2.imread(path), cv2.COLOR_BGR2RGB)  # type: ignore[arg-type]  # None for no picture
+    picture = cv2.cvtColor(cv2.imread(path), cv2.COLOR_BGR2RGB)  # type: ignore[arg-type]
     return {
-        "oil_painting": min(_seconds(lambda: cv2.xphoto.oilPainting(picture, 7, 1)) for _ in range(repeats)),
-        "stylization": min(_seconds(lambda: cv2.stylization(picture)) for _ in range(repeats)),
+        "oil_painting": min(
+            seconds_of(lambda: cv2.xphoto.oilPainting(picture, 7, 1)) for _ in range(repeats)
+        ),
+        "stylization": min(seconds_of(lambda: cv2.stylization(picture)) for _ in range(repeats)),
     }
 
 
 PARTS: dict[str, Callable[..., Any]] = {
-    part.__name__: part for part in (machine, photo, rubbing, sheet, threads, live, strokes, filters)
+    part.__name__: part
+    for part in (machine, photo, rubbing, sheet, threads, live, strokes, filters)
 }
 
 
-# ---- processes -------------------------------------------------------------------------------------------
+# ---- what the parts share ------------------------------------------------------------------------
 
 
-def _child(part: str, *given: Any, **environment: str) -> Any:
-    """What a part returns."""
+def child(part: str, *given: Any, **environment: str) -> Any:
+    """What a part returns, run in a process of its own."""
     command = [sys.executable, "-m", "crayonize.bench.parts", part, json.dumps(given)]
     run = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
     if run.returncode:
@@ -223,48 +203,10 @@ def _child(part: str, *given: Any, **environment: str) -> Any:
     return json.loads(run.stdout)
 
 
-def _starts(folder: str, repeats: int, cold: bool) -> Figures:
-    """Seconds of whole commands as the shell sees them."""
-    given, out = Path(folder) / "start.jpg", Path(folder) / "start.png"
-    _child("photo", str(given), 0.4)
-
-    def command(*words: object, **environment: str) -> float:
-        line, with_ours = [sys.executable, "-m", "crayonize", *map(str, words)], os.environ | environment
-        return _seconds(partial(subprocess.run, line, env=with_ours, stdout=subprocess.DEVNULL, check=True))
-
-    draw = (given, out, "--size", 800, "-q")
-    command(*draw)  # from now on the kernels are kept
-    found = {"help": min(command("--help") for _ in range(3)), "photo_800": min(command(*draw) for _ in range(repeats))}
-    if cold:
-        found["photo_800_cold"] = command(*draw, CRAYONIZE_CACHE=str(Path(folder) / "cache"), CRAYONIZE_NO_CACHE="")
-    return found
-
-
-def _yardsticks(megapixels: float, folder: str, repeats: int) -> Figures:
-    """The same strokes by kernels and by plain Python; what OpenCV does with the photo of a sheet."""
-    return {
-        "strokes": _child("strokes", 3 + repeats),
-        "strokes_uncompiled": _child("strokes", 1, NUMBA_DISABLE_JIT="1"),
-        **_child("filters", str(Path(folder) / f"{megapixels:g}.jpg"), repeats),
-    }
-
-
-def _ratios(found: Figures) -> Figures:
-    """What was timed in the same run over the kernels, and under the whole of the smallest drawing."""
-    first, beside = found["sheets"][0], found["yardsticks"]
-    whole = first["seconds_per_mp"]["all"] * first["cells"] / 1e6
-    return {
-        "uncompiled_over_kernels": beside["strokes_uncompiled"] / beside["strokes"],
-        "whole_over_uncompiled_strokes": whole / beside["strokes_uncompiled"],
-        "whole_over_filters": whole / (beside["oil_painting"] + beside["stylization"]),
-    }
-
-
-# ---- what the parts share --------------------------------------------------------------------------------
-
-
 class _Clock:
-    """Where the time from photo to picture goes; looks on (pipeline.Watch) to know one stage from the next."""
+    """Where the time from photo to picture goes; looks on (pipeline.Watch) to know one stage from
+    the next.
+    """
 
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(STAGES, 0.0)
@@ -281,7 +223,11 @@ class _Clock:
     def open(self, easel: "Easel") -> None:
         """The paper is made; all that is not done by the easel from now on is planning."""
         self._turn("planning")
-        for name, stage in (("draw", "simulation"), ("seen", "looking"), ("picture_srgb", "rendering")):
+        for name, stage in (
+            ("draw", "simulation"),
+            ("seen", "looking"),
+            ("picture_srgb", "rendering"),
+        ):
             setattr(easel, name, self._timed(stage, getattr(easel, name)))
 
     def strokes(self, strokes: "Sequence[Stroke]", share: float) -> None:
@@ -312,7 +258,9 @@ def _staged(path: Path, megapixels: float) -> "tuple[dict[str, float], Drawing]"
     clock = _Clock()
     given = read_linear(path, api.PHOTO_SIDE)
     with clock.stage("paper"):
-        drawing, easel = workshop.sketch(given, Settings(size=side, sheet_mm=side * CELL_MM), None, clock)
+        drawing, easel = workshop.sketch(
+            given, Settings(size=side, sheet_mm=side * CELL_MM), None, clock
+        )
     picture = easel.picture_srgb()
     with clock.stage("writing"):
         write_image(path.with_suffix(".png"), picture)
@@ -325,9 +273,11 @@ def _rubbed(side: int, smears: bool) -> float:
 
     stand, edge = _blank(side, smears), TIP_CELLS
     ways = range(edge, side - edge + 1, round(0.62 * TIP_CELLS))
-    lines = [[(edge, y), (side - edge, y)] for y in ways] + [[(x, edge), (x, side - edge)] for x in ways]
+    lines = [[(edge, y), (side - edge, y)] for y in ways] + [
+        [(x, edge), (x, side - edge)] for x in ways
+    ]
     drawn = [_stroke(line, stand, i // len(ways)) for i, line in enumerate(lines)]
-    seconds = _seconds(lambda: stand.draw(drawn))
+    seconds = seconds_of(lambda: stand.draw(drawn))
     mask = stand.box.masks[0]
     stride = max(1, stand.box.constants.step * TIP_CELLS)
     contacts = len(lines) * round((side - 2 * edge) / stride)
@@ -353,10 +303,16 @@ def _stroke(cells: Sequence[tuple[float, float]], stand: "Easel", crayon: int) -
 
     tip = Tip("blunt", TIP_CELLS * CELL_MM)
     force = np.full(len(cells), FORCE_N_MM2 * math.pi / 4 * tip.width_mm**2, np.float32)
-    return Stroke(np.array(cells, np.float32) * np.float32(CELL_MM), force, stand.box.palette.crayons[crayon].name, tip)
+    return Stroke(
+        np.array(cells, np.float32) * np.float32(CELL_MM),
+        force,
+        stand.box.palette.crayons[crayon].name,
+        tip,
+    )
 
 
-def _seconds(act: Callable[[], object]) -> float:
+def seconds_of(act: Callable[[], object]) -> float:
+    """How long something takes."""
     begun = time.perf_counter()
     act()
     return time.perf_counter() - begun
@@ -383,46 +339,16 @@ def _peak_bytes() -> int:
     """The most memory this process has held so far; 0 where the system does not tell."""
     with suppress(OSError):
         for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith("VmHWM:"):  # unlike ru_maxrss it leaves out the process that started this one
+            # unlike ru_maxrss it leaves out the process that started this one
+            if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
     with suppress(ImportError):
         import resource
 
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
+            1 if sys.platform == "darwin" else 1024
+        )
     return 0
-
-
-# ---- the table -------------------------------------------------------------------------------------------
-
-
-def _lines(found: Figures) -> Iterator[str]:
-    on, starts, rates, sheets = (found[name] for name in ("machine", "start", "cell_steps_per_second", "sheets"))
-    yield f"crayonize {found['crayonize']}; {on['cpu']}, {on['cores']} cores; {on['system']}"
-    yield f"Python {on['python']}, numpy {on['numpy']}, numba {on['numba']}, OpenCV {on['cv2']}"
-    yield _row("\nwax, one thread", "with smearing", "without")
-    yield _row("million cell-steps per second", *(f"{rate / 1e6:.1f}" for rate in rates.values()))
-    yield _row("\nseconds per megapixel", *(f"{s['megapixels']:g} MP" for s in sheets))
-    for name in (*STAGES, "all"):
-        yield _row(name, *(f"{s['seconds_per_mp'][name]:.3f}" for s in sheets))
-    yield _row("strokes", *(f"{s['strokes']}" for s in sheets))
-    yield _row("peak memory, bytes per cell", *(f"{s['bytes_per_cell']:.0f}" for s in sheets))
-    speed_up = found["threads"]["speed_up"]
-    yield _row(f"\nthreads, {sheets[1]['megapixels']:g} MP", *speed_up)
-    yield _row("simulation, times as fast", *(f"{ratio:.2f}" for ratio in speed_up.values()))
-    yield _row("\nseconds from the shell", *(name.replace("_", " ") for name in starts))
-    yield _row("", *(f"{seconds:.2f}" for seconds in starts.values()))
-    yield _row("\nlive, ms from move to pixels", "min", "median", "max")
-    for size, took in found["live_ms"].items():
-        yield _row(f"A4, {size} cells", *(f"{ms:.2f}" for ms in took.values()))
-    ratios, whole = found["ratios"], f"{sheets[0]['megapixels']:g} MP drawing over"
-    yield "\nratios of times in this run"
-    yield _row("eight strokes uncompiled over compiled", f"{ratios['uncompiled_over_kernels']:.0f}")
-    yield _row(f"{whole} those uncompiled", f"{ratios['whole_over_uncompiled_strokes']:.2f}")
-    yield _row(f"{whole} oilPainting + stylization", f"{ratios['whole_over_filters']:.2f}")
-
-
-def _row(name: str, *values: str) -> str:
-    return f"{name:43}" + "".join(f"{value:>15}" for value in values)
 
 
 if __name__ == "__main__":

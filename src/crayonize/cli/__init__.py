@@ -1,12 +1,12 @@
 """The command `crayonize`: words in, one picture or a folder of them out, errors as one line.
 
-The first word chooses: draw, steps, palettes, styles, papers, warmup or bench; anything else is a photo. Nothing
-but this room prints, with the account of a batch. `--help` and the listings load neither numpy nor numba, so
-imports of anything heavy stand inside functions.
+The first word chooses: draw, steps, palettes, styles, papers, warmup or bench; anything else is a
+photo. Nothing but this room prints, with the account of a batch. `--help` and the listings load
+neither numpy nor numba, so imports of anything heavy stand inside functions.
 
-Exit codes: 0 done; 1 stopped (an output cannot be written, an error of ours); 2 what was asked for cannot be
-done (an option, a file, a package that is missing); 3 some photos of a folder failed; 4 another run holds the
-folder; 130 Ctrl-C; 143 terminated.
+Exit codes: 0 done; 1 stopped (an output cannot be written, an error of ours); 2 what was asked for
+cannot be done (an option, a file, a package that is missing); 3 some photos of a folder failed; 4
+another run holds the folder; 130 Ctrl-C; 143 terminated.
 """
 
 import atexit
@@ -25,7 +25,8 @@ from .commands import COMMANDS, convert
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     words = list(sys.argv[1:] if words is None else words)
-    atexit.register(gc.freeze)  # what is left at the end goes as a whole; to look through it first takes 0.2 s
+    # what is left at the end goes as a whole; to look through it first takes 0.2 s
+    atexit.register(gc.freeze)
     with suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     for stream in (sys.stdout, sys.stderr):

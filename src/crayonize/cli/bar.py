@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def talk(options: argparse.Namespace) -> Iterator["Progress"]:
-    """The progress line, and our own messages, on stderr; with -q nothing, and warnings only with -v."""
+    """The progress line, and our own messages, on stderr; with -q nothing, and warnings only with
+    -v.
+    """
     import logging
     import warnings
 

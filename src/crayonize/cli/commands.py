@@ -49,17 +49,29 @@ def convert(words: Sequence[str]) -> int:
     with talk(options) as progress, open_photo(photo) as opened:
         settings = page.fitted(settings, options.print, options.dpi, opened.width, opened.height)
         kept = metadata.kept(opened.picture, options.metadata)
-        with api.filming(options.timelapse, options.seconds, options.show_tip, options.light) as watch:
+        with api.filming(
+            options.timelapse, options.seconds, options.show_tip, options.light
+        ) as watch:
             drawing, easel = api.sketch(opened, settings, progress, watch)
-        api.finish(drawing, easel, out, options.strokes, light=options.light, settings=settings, kept=kept,
-                   legend=options.legend)  # fmt: skip
+        api.finish(
+            drawing,
+            easel,
+            out,
+            options.strokes,
+            light=options.light,
+            settings=settings,
+            kept=kept,
+            legend=options.legend,
+        )
     if options.verbose or (options.out is None and not options.quiet):
         report(out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
 
 
 def _spare_photo(out: str) -> None:
-    """ValueError if what is to be written over may be a photo: `crayonize *.jpg` can come to two names."""
+    """ValueError if what is to be written over may be a photo: `crayonize *.jpg` can come to two
+    names.
+    """
     from ..images.write import holds_other_picture
 
     if holds_other_picture(out):
@@ -77,9 +89,15 @@ def _draw(words: Sequence[str]) -> int:
     api.check_outputs([options.drawing], options.out, options.strokes, options.timelapse)
     with talk(options) as progress:
         given = _strokes(options)
-        with api.filming(options.timelapse, options.seconds, options.show_tip, options.light) as watch:
-            drawing, easel = api.redraw(given, options.size, options.threads, options.preview, progress, watch=watch)
-        api.finish(drawing, easel, options.out, options.strokes, light=options.light, legend=options.legend)
+        with api.filming(
+            options.timelapse, options.seconds, options.show_tip, options.light
+        ) as watch:
+            drawing, easel = api.redraw(
+                given, options.size, options.threads, options.preview, progress, watch=watch
+            )
+        api.finish(
+            drawing, easel, options.out, options.strokes, light=options.light, legend=options.legend
+        )
     if options.verbose:
         report(options.out, easel, len(drawing.strokes), drawing.seed, begun)
     return 0
@@ -87,9 +105,14 @@ def _draw(words: Sequence[str]) -> int:
 
 def _steps(words: Sequence[str]) -> int:
     """crayonize steps DRAWING OUT: pages to draw it after."""
-    parser = Parser("crayonize steps", "Make pages that show how to draw it: the outline, then crayon by crayon.")
+    parser = Parser(
+        "crayonize steps",
+        "Make pages that show how to draw it: the outline, then crayon by crayon.",
+    )
     parser.add_argument("drawing", metavar="DRAWING", help="a .json or .svg file of strokes")
-    parser.add_argument("out", metavar="OUT", help="a .pdf, a .png (pages are numbered), or a folder for .png pages")
+    parser.add_argument(
+        "out", metavar="OUT", help="a .pdf, a .png (pages are numbered), or a folder for .png pages"
+    )
     add_strokes(parser)
     add_talk(parser)
     options = parser.read(words)
@@ -109,13 +132,19 @@ def _strokes(options: argparse.Namespace) -> "Drawing":
 
     say = logging.getLogger("crayonize").info
     return api.load_strokes(
-        options.drawing, palette=options.palette, paper=options.paper, widths=options.widths, say=say
+        options.drawing,
+        palette=options.palette,
+        paper=options.paper,
+        widths=options.widths,
+        say=say,
     )
 
 
 def _warmup(words: Sequence[str]) -> int:
     """crayonize warmup: fill the compile cache."""
-    parser = Parser(prog="crayonize warmup", description="Compile everything for this machine, and keep it.")
+    parser = Parser(
+        prog="crayonize warmup", description="Compile everything for this machine, and keep it."
+    )
     add_talk(parser)
     options = parser.read(words)
     begun = time.monotonic()
@@ -131,9 +160,17 @@ def _warmup(words: Sequence[str]) -> int:
 
 def _bench(words: Sequence[str]) -> int:
     """crayonize bench: measure, and print a table."""
-    parser = Parser("crayonize bench", "Measure how fast it is on this machine; takes some minutes.")
-    parser.add_argument("--json", metavar="FILE", help="write all figures there; - writes them to stdout, and no table")
-    parser.add_argument("--quick", action="store_true", help="half a minute: smaller pictures, each measured once")
+    parser = Parser(
+        "crayonize bench", "Measure how fast it is on this machine; takes some minutes."
+    )
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write all figures there; - writes them to stdout, and no table",
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="half a minute: smaller pictures, each measured once"
+    )
     add_talk(parser)
     options = parser.read(words)
 
@@ -141,22 +178,25 @@ def _bench(words: Sequence[str]) -> int:
 
     from stroke_gen.files import whole_file
 
-    from ..bench import parts as bench
+    from ..bench import measure
+    from ..bench.table import table
 
     aside = options.json is not None and options.json != "-"
     with whole_file(options.json) if aside else nullcontext() as part, talk(options) as progress:
         if part:
             part.touch()  # better now than after some minutes
-        found = bench.measure(options.quick, progress)
+        found = measure.measure(options.quick, progress)
         if part:
             part.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
-    print(json.dumps(found, indent=1) if options.json == "-" else bench.table(found))
+    print(json.dumps(found, indent=1) if options.json == "-" else table(found))
     return 0
 
 
 def _palettes(words: Sequence[str]) -> int:
     """crayonize palettes: list the boxes of crayons."""
-    Parser(prog="crayonize palettes", description="List the boxes of crayons, for --palette.").read(words)
+    Parser(prog="crayonize palettes", description="List the boxes of crayons, for --palette.").read(
+        words
+    )
     from ..crayons.palette import palette_names
 
     return _list((name, f"{number:3} crayons  {title}") for name, title, number in palette_names())

@@ -16,25 +16,40 @@ from ..settings import Settings
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that concern folders and lists of photos."""
-    group = parser.add_argument_group("folders", "Given a folder, or several photos and -o, all are drawn.")
+    group = parser.add_argument_group(
+        "folders", "Given a folder, or several photos and -o, all are drawn."
+    )
     add = group.add_argument
     add("-o", "--output", metavar="FOLDER", help="where the pictures go; made if need be")
-    add("-j", "--jobs", type=_count, metavar="N", help="photos drawn at once (as cores and memory allow)")
+    add(
+        "-j",
+        "--jobs",
+        type=_count,
+        metavar="N",
+        help="photos drawn at once (as cores and memory allow)",
+    )
     add(
         "--existing",
         choices=EXISTING,
         default="auto",
-        help="pictures already there: auto draws what has changed, so it goes on after a break (%(default)s)",
+        help="pictures already there: auto draws what has changed, so it goes on after a break "
+        "(%(default)s)",
     )
     add("--format", choices=FORMATS, default="png", help="of the pictures (%(default)s)")
     add(
         "--name",
         default="{stem}",
         metavar="TEMPLATE",
-        help='name of a picture, such as "{stem}.crayon", of {stem}, {name}, {suffix}, {parent}, {palette}, '
+        help='name of a picture, such as "{stem}.crayon", of {stem}, {name}, {suffix}, {parent}, '
+        "{palette}, "
         "{paper}, {style}, {seed} (%(default)s)",
     )
-    add("--shard", type=_shard, metavar="I/N", help="only the I-th of N parts, for runs on several machines")
+    add(
+        "--shard",
+        type=_shard,
+        metavar="I/N",
+        help="only the I-th of N parts, for runs on several machines",
+    )
     add("--dry-run", action="store_true", help="only tell what would be done")
     add(
         "--json",
@@ -47,8 +62,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="stay, and draw each photo that is put into the folder, until Ctrl-C",
     )
     add("--dask", metavar="URL", help="draw on this Dask cluster, such as tcp://scheduler:8786")
-    add("--max-pixels", type=_amount, default=MAX_PIXELS, metavar="N", help="refuse larger photos (250M)")
-    add("--max-bytes", type=_amount, default=MAX_BYTES, metavar="N", help="refuse larger files (1G)")
+    add(
+        "--max-pixels",
+        type=_amount,
+        default=MAX_PIXELS,
+        metavar="N",
+        help="refuse larger photos (250M)",
+    )
+    add(
+        "--max-bytes", type=_amount, default=MAX_BYTES, metavar="N", help="refuse larger files (1G)"
+    )
     add("--time-limit", type=_seconds, default=TIME_LIMIT, metavar="S",
         help="seconds one photo may take (%(default)g)")  # fmt: skip
 
@@ -64,8 +87,8 @@ def options_of(parsed: argparse.Namespace) -> Options:
 def inputs_and_output(paths: Sequence[str], output: str | None) -> tuple[list[str], str] | None:
     """What the names on a command line mean: photos and folders to be drawn into a folder, or None.
 
-    None stands for one photo, with or without the name of its picture. ValueError if no folder for the
-    pictures is named where one is needed.
+    None stands for one photo, with or without the name of its picture. ValueError if no folder for
+    the pictures is named where one is needed.
     """
     if output is not None:
         named = len(paths) == 1 and not _is_folder(paths[0]) and not _is_folder(output)
@@ -88,8 +111,15 @@ def _is_folder(path: str) -> bool:
 
 def recipe_of(parsed: argparse.Namespace, settings: Settings) -> Recipe:
     """How every photo is drawn, of all that was parsed."""
-    return Recipe(settings, parsed.light, parsed.metadata, parsed.print, parsed.dpi, parsed.max_pixels,
-                  parsed.max_bytes)  # fmt: skip
+    return Recipe(
+        settings,
+        parsed.light,
+        parsed.metadata,
+        parsed.print,
+        parsed.dpi,
+        parsed.max_pixels,
+        parsed.max_bytes,
+    )
 
 
 def check_alone(parsed: argparse.Namespace) -> None:
@@ -98,7 +128,9 @@ def check_alone(parsed: argparse.Namespace) -> None:
     add_options(parser)
     for name, default in vars(parser.parse_args([])).items():
         if name != "output" and getattr(parsed, name) != default:
-            raise ValueError(f"--{name.replace('_', '-')} is for folders, or several photos and -o FOLDER")
+            raise ValueError(
+                f"--{name.replace('_', '-')} is for folders, or several photos and -o FOLDER"
+            )
 
 
 def _count(text: str) -> int:
@@ -117,7 +149,9 @@ def _shard(text: str) -> tuple[int, int]:
 def _amount(text: str) -> int:
     parts = re.fullmatch(r"(\d{1,15})([kMG]?)", text, re.ASCII)
     if not parts:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, or one with k, M or G behind it")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a whole number, or one with k, M or G behind it"
+        )
     return int(parts[1]) * {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}[parts[2]]
 
 

@@ -23,7 +23,9 @@ other commands:
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse, complaining in our way: by a ValueError of one line that names the nearest option."""
+    """argparse, complaining in our way: by a ValueError of one line that names the nearest
+    option.
+    """
 
     def __init__(self, prog: str, description: str, epilog: str = "") -> None:
         super().__init__(
@@ -57,19 +59,45 @@ def photo_parser() -> Parser:
     add = parser.add_argument
     add("out", metavar="OUT", nargs="?", help="PNG, JPEG, WebP or TIFF; else PHOTO.crayon.png")
     add("more", metavar="PHOTO", nargs="*", help=argparse.SUPPRESS)
-    add("--palette", default=Settings.palette, help="of `crayonize palettes`, a file, or #rrggbb,... (%(default)s)")
-    add("--style", default=Settings.style, help="of `crayonize styles`, or a .toml file (%(default)s)")
-    add("--paper", default=Settings.paper, help="of `crayonize papers`, or a picture of one (%(default)s)")
-    add("--force", default=Settings.force, help="light, normal, heavy or a factor, 0.1 to 5 (%(default)s)")
+    add(
+        "--palette",
+        default=Settings.palette,
+        help="of `crayonize palettes`, a file, or #rrggbb,... (%(default)s)",
+    )
+    add(
+        "--style",
+        default=Settings.style,
+        help="of `crayonize styles`, or a .toml file (%(default)s)",
+    )
+    add(
+        "--paper",
+        default=Settings.paper,
+        help="of `crayonize papers`, or a picture of one (%(default)s)",
+    )
+    add(
+        "--force",
+        default=Settings.force,
+        help="light, normal, heavy or a factor, 0.1 to 5 (%(default)s)",
+    )
     add("--age", type=_whole, help="of the one who draws in style child, 3 to 10")
     add("--left-handed", action="store_true", help="hatching leans the other way")
-    add("--seed", type=_seed, default=Settings.seed, help="a whole number, or `random` (%(default)s)")
+    add(
+        "--seed",
+        type=_seed,
+        default=Settings.seed,
+        help="a whole number, or `random` (%(default)s)",
+    )
     add("--focus", type=_focus, action="append", default=[], metavar="X,Y,W,H",
         help="a part that deserves care, in fractions of the picture; may be repeated")  # fmt: skip
     add("--print", choices=page.PAGES, help="fill a page of this size")
     add("--dpi", type=_dpi, help="pixels to the inch, in place of --size (300 with --print)")
-    add("--metadata", choices=metadata.CHOICES, default="safe",
-        help="what the photo tells of itself: safe keeps title, names, date, but no place (%(default)s)")  # fmt: skip
+    add(
+        "--metadata",
+        choices=metadata.CHOICES,
+        default="safe",
+        help="what the photo tells of itself: safe keeps title, names, date, but no place "
+        "(%(default)s)",
+    )
     _add_beside(parser)
     _add_size(parser)
     add_talk(parser)
@@ -93,22 +121,48 @@ def add_strokes(parser: Parser) -> None:
     add = parser.add_argument
     add("--palette", help="in place of the drawing's own; for a .svg else box24")
     add("--paper", help="in place of the drawing's own; for a .svg else drawing")
-    add("--widths", choices=("tip", "force"), default="tip", help="what line width becomes, of a .svg (%(default)s)")
+    add(
+        "--widths",
+        choices=("tip", "force"),
+        default="tip",
+        help="what line width becomes, of a .svg (%(default)s)",
+    )
 
 
 def _add_beside(parser: Parser) -> None:
     add = parser.add_argument
-    add("--strokes", metavar="FILE", help="save the strokes: .json for `crayonize draw`, .svg for other programs")
-    add("--timelapse", metavar="FILE", help="film the drawing being drawn: .webp, .gif, .png or .mp4")
+    add(
+        "--strokes",
+        metavar="FILE",
+        help="save the strokes: .json for `crayonize draw`, .svg for other programs",
+    )
+    add(
+        "--timelapse",
+        metavar="FILE",
+        help="film the drawing being drawn: .webp, .gif, .png or .mp4",
+    )
     add("--seconds", type=float, default=12.0, help="length of the film (%(default)g)")
     add("--show-tip", action="store_true", help="with the crayon in the film")
-    add("--legend", action="store_true", help="put the crayons used, and how much of each, beside the drawing")
+    add(
+        "--legend",
+        action="store_true",
+        help="put the crayons used, and how much of each, beside the drawing",
+    )
 
 
 def _add_size(parser: Parser) -> None:
     add = parser.add_argument
-    add("--size", type=_whole, default=Settings.size, help="long side in pixels, 1 to 20000 (%(default)s)")
-    add("--threads", type=_whole, help="at most so many at once; the picture stays the same (all cores)")
+    add(
+        "--size",
+        type=_whole,
+        default=Settings.size,
+        help="long side in pixels, 1 to 20000 (%(default)s)",
+    )
+    add(
+        "--threads",
+        type=_whole,
+        help="at most so many at once; the picture stays the same (all cores)",
+    )
     add("--preview", action="store_true", help="quick: half the size")
     add("--no-light", dest="light", action="store_false", help="no shading of the relief")
 
@@ -146,4 +200,6 @@ def _focus(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not x,y,w,h in fractions of the picture") from None
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not x,y,w,h in fractions of the picture"
+        ) from None

@@ -1,4 +1,6 @@
-"""Which crayons a drawing uses, light to dark: the order in which they are laid out, in layers and on pages."""
+"""Which crayons a drawing uses, light to dark: the order in which they are laid out, in layers and
+on pages.
+"""
 
 from stroke_gen.drawing import Drawing, Stroke
 

@@ -1,7 +1,8 @@
 """Moving pictures: a stream of frames becomes an animated WebP, GIF or PNG, or an MP4.
 
-The writers pull frames from an iterator, so that only a few are in memory at a time; frames are left alone once
-they have been handed over. Every frame but the first and the last stands for 1/FPS second.
+The writers pull frames from an iterator, so that only a few are in memory at a time; frames are
+left alone once they have been handed over. Every frame but the first and the last stands for 1/FPS
+second.
 """
 
 import importlib.util
@@ -49,10 +50,14 @@ def check(path: str | os.PathLike[str]) -> None:
     """ValueError, before any work is done, if a film cannot be written to `path`."""
     suffix = Path(path).suffix.lower()
     if suffix not in WRITERS:
-        raise ValueError(f"{os.fspath(path)!r}: cannot write {suffix or 'without suffix'}; use {', '.join(WRITERS)}")
+        raise ValueError(
+            f"{os.fspath(path)!r}: cannot write {suffix or 'without suffix'}; use "
+            f"{', '.join(WRITERS)}"
+        )
     if suffix == ".mp4" and not importlib.util.find_spec("av") and not shutil.which("ffmpeg"):
         raise ValueError(
-            f"{os.fspath(path)!r}: MP4 needs PyAV (pip install 'crayonize[video]') or ffmpeg on the PATH; "
+            f"{os.fspath(path)!r}: MP4 needs PyAV (pip install 'crayonize[video]') or ffmpeg on "
+            "the PATH; "
             "WebP, GIF and PNG need neither"
         ) from ModuleNotFoundError("av")
     check_target(path)
@@ -68,11 +73,13 @@ def write(path: str | os.PathLike[str], reel: Reel, frames: Iterator[Frame]) -> 
         WRITERS[part.suffix.lower()](part, reel, frames)
 
 
-# ---- WebP and GIF by Pillow --------------------------------------------------------------------------------
+# ---- WebP and GIF by Pillow ----------------------------------------------------------------------
 
 
 class _Lazy:
-    """Pictures that exist only when looked at, behind the face of one Pillow image with many frames."""
+    """Pictures that exist only when looked at, behind the face of one Pillow image with many
+    frames.
+    """
 
     def __init__(self, frames: Iterator[Frame], count: int) -> None:
         self._frames, self.n_frames = frames, count
@@ -90,24 +97,45 @@ def _webp(path: Path, reel: Reel, frames: Iterator[Frame]) -> None:
     first = Image.fromarray(next(frames))
     rest: Any = [_Lazy(frames, reel.frames - 1)]
     durations = [1000 * n // FPS for n in reel.lengths()]
-    first.save(path, "WEBP", save_all=True, append_images=rest, duration=durations, loop=0, quality=WEBP_QUALITY,
-               method=2, kmin=0, kmax=0)  # fmt: skip
+    first.save(
+        path,
+        "WEBP",
+        save_all=True,
+        append_images=rest,
+        duration=durations,
+        loop=0,
+        quality=WEBP_QUALITY,
+        method=2,
+        kmin=0,
+        kmax=0,
+    )
 
 
 def _gif(path: Path, reel: Reel, frames: Iterator[Frame]) -> None:
     """One palette for all frames, so that what did not change costs nothing."""
     colours = Image.new("P", (1, 1))
     colours.putpalette(ImagePalette.ImagePalette("RGB", reel.palette[:255].tobytes()))
-    pictures = (Image.fromarray(f).quantize(palette=colours, dither=Image.Dither.NONE) for f in frames)
+    pictures = (
+        Image.fromarray(f).quantize(palette=colours, dither=Image.Dither.NONE) for f in frames
+    )
     durations = [1000 * n // FPS for n in reel.lengths()]
-    next(pictures).save(path, "GIF", save_all=True, append_images=pictures, duration=durations, loop=0, optimize=True)
+    next(pictures).save(
+        path,
+        "GIF",
+        save_all=True,
+        append_images=pictures,
+        duration=durations,
+        loop=0,
+        optimize=True,
+    )
 
 
-# ---- PNG ---------------------------------------------------------------------------------------------------
+# ---- PNG -----------------------------------------------------------------------------------------
 
 
 def _png(path: Path, reel: Reel, frames: Iterator[Frame]) -> None:
-    """An animated PNG, lossless; of each frame only the changed pixels are opaque, in the smallest rectangle.
+    """An animated PNG, lossless; of each frame only the changed pixels are opaque, in the smallest
+    rectangle.
 
     Pillow would hold all frames, and store the whole rectangle: ten times the bytes for a drawing.
     """
@@ -115,7 +143,9 @@ def _png(path: Path, reel: Reel, frames: Iterator[Frame]) -> None:
 
         def chunk(kind: bytes, *data: Any) -> None:
             body = kind + b"".join(data)
-            file.write(struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body)))
+            file.write(
+                struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+            )
 
         file.write(b"\x89PNG\r\n\x1a\n")
         chunk(b"IHDR", struct.pack(">IIBBBBB", reel.width, reel.height, 8, 6, 0, 0, 0))
@@ -126,8 +156,14 @@ def _png(path: Path, reel: Reel, frames: Iterator[Frame]) -> None:
             pixels = _packed(frame)
             top, left, part = _changed(before, pixels)
             size = (part.shape[1], part.shape[0])
-            chunk(b"fcTL", struct.pack(">IIIIIHHBB", number, *size, left, top, length, FPS, 0, before is not None))
-            rows = np.zeros((size[1], 1 + 4 * size[0]), np.uint8)  # each after the number of its filter, 0
+            chunk(
+                b"fcTL",
+                struct.pack(
+                    ">IIIIIHHBB", number, *size, left, top, length, FPS, 0, before is not None
+                ),
+            )
+            # each after the number of its filter, 0
+            rows = np.zeros((size[1], 1 + 4 * size[0]), np.uint8)
             rows[:, 1:] = part.view(np.uint8).reshape(size[1], -1)
             data = zlib.compress(rows.tobytes(), 3)
             if before is None:
@@ -146,7 +182,9 @@ def _packed(frame: Frame) -> NDArray[np.uint32]:
     return rgba.view(np.uint32)[..., 0]
 
 
-def _changed(before: NDArray[np.uint32] | None, now: NDArray[np.uint32]) -> tuple[int, int, NDArray[np.uint32]]:
+def _changed(
+    before: NDArray[np.uint32] | None, now: NDArray[np.uint32]
+) -> tuple[int, int, NDArray[np.uint32]]:
     """Top, left and pixels of what differs from the frame before; the rest is clear (0)."""
     if before is None:
         return 0, 0, now
@@ -157,7 +195,7 @@ def _changed(before: NDArray[np.uint32] | None, now: NDArray[np.uint32]) -> tupl
     return top, left, np.where(differs, now, np.uint32(0))[top:bottom, left:right]
 
 
-# ---- MP4 ---------------------------------------------------------------------------------------------------
+# ---- MP4 -----------------------------------------------------------------------------------------
 
 
 def _mp4(path: Path, reel: Reel, frames: Iterator[Frame]) -> None:
@@ -179,7 +217,9 @@ def _mp4_av(path: Path, width: int, height: int, frames: Iterator[Frame]) -> Non
         bt709 = "colorprim=bt709:transfer=bt709:colormatrix=bt709"
         stream.options = {"preset": "veryfast", "crf": str(CRF), "x264-params": bt709}
         for number, frame in enumerate(frames):
-            picture = av.VideoFrame.from_ndarray(frame, "rgb24").reformat(format="yuv420p", dst_colorspace="ITU709")
+            picture = av.VideoFrame.from_ndarray(frame, "rgb24").reformat(
+                format="yuv420p", dst_colorspace="ITU709"
+            )
             picture.pts, picture.time_base = number, Fraction(1, FPS)
             container.mux(stream.encode(picture))
         container.mux(stream.encode(None))
@@ -187,11 +227,41 @@ def _mp4_av(path: Path, width: int, height: int, frames: Iterator[Frame]) -> Non
 
 def _mp4_ffmpeg(path: Path, width: int, height: int, frames: Iterator[Frame]) -> None:
     bt709 = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
-    command = ["ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-               "-r", str(FPS), "-i", "pipe:0", "-vf", "scale=out_color_matrix=bt709", "-pix_fmt", "yuv420p", *bt709,
-               "-c:v", "libx264", "-preset", "veryfast", "-crf", str(CRF), "-movflags", "+faststart",
-               "-f", "mp4", "-y", str(path)]  # fmt: skip
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as program:
+    command = [
+        "ffmpeg",
+        "-v",
+        "error",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+        "-r",
+        str(FPS),
+        "-i",
+        "pipe:0",
+        "-vf",
+        "scale=out_color_matrix=bt709",
+        "-pix_fmt",
+        "yuv420p",
+        *bt709,
+        "-c:v",
+        "libx264",
+        "-preset",
+        "veryfast",
+        "-crf",
+        str(CRF),
+        "-movflags",
+        "+faststart",
+        "-f",
+        "mp4",
+        "-y",
+        str(path),
+    ]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as program:
         assert program.stdin and program.stderr
         try:
             for frame in frames:

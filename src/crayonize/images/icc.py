@@ -1,4 +1,6 @@
-"""Colour at the doors: the sRGB curve both ways, and what an ICC profile says about a picture's numbers."""
+"""Colour at the doors: the sRGB curve both ways, and what an ICC profile says about a picture's
+numbers.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,13 @@ Curve = Callable[[NDArray[Any]], NDArray[Any]]  # stored value 0..1 -> light 0..
 
 _CHUNK = 1 << 20  # values encoded at a time, so that the scratch arrays stay in the cache
 _BINS = (
-    4095  # of the encoding table: narrower than the narrowest sRGB step (1 / 3294), so one edge a bin at most
+    # of the encoding table: narrower than the narrowest sRGB step (1 / 3294), so one edge a bin at
+    # most
+    4095
 )
 
-# Columns: red, green, blue of sRGB as XYZ under D50, in the rounding of ICC profiles (IEC 61966-2-1).
+# Columns: red, green, blue of sRGB as XYZ under D50, in the rounding of ICC profiles (IEC
+# 61966-2-1).
 _SRGB_TO_XYZ = np.array([[28576, 25239, 9375], [14581, 46983, 3972], [912, 6361, 46787]]) / 65536
 
 
@@ -74,7 +79,9 @@ def lineariser(
 
 
 def decode_srgb(encoded: NDArray[Any]) -> NDArray[np.float32]:
-    """Undo the sRGB curve (IEC 61966-2-1): uint8, uint16 or float 0..1, any shape -> linear float32."""
+    """Undo the sRGB curve (IEC 61966-2-1): uint8, uint16 or float 0..1, any shape -> linear
+    float32.
+    """
     encoded = np.asarray(encoded)
     full = float(np.iinfo(encoded.dtype).max) if encoded.dtype.kind == "u" else 1.0
     return lineariser(SRGB, 1, encoded.dtype, full)(encoded)
@@ -82,9 +89,12 @@ def decode_srgb(encoded: NDArray[Any]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def _encoding_tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """(the code at the lower end of each bin, the light from which each code gives way to the next)."""
+    """(the code at the lower end of each bin, the light from which each code gives way to the
+    next).
+    """
     edges = np.append(_srgb_curve((np.arange(255) + 0.5) / 255), np.inf).astype(np.float32)
-    # A hundredth below the bin, as rounding may put a value into the bin above; the edge test mends it.
+    # A hundredth below the bin, as rounding may put a value into the bin above; the edge test mends
+    # it.
     low = np.searchsorted(edges, (np.arange(_BINS + 1) - 0.01) / _BINS, side="right")
     return low.astype(np.uint8), edges
 
@@ -92,8 +102,9 @@ def _encoding_tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 def encode_srgb(linear: NDArray[Any]) -> NDArray[np.uint8]:
     """Put light through the sRGB curve (IEC 61966-2-1) and round to the nearest of 256 steps.
 
-    linear: float of any shape; below 0 and above 1 is clipped. Exact and the same on every machine: a table
-    finds the step or the one below, a comparison with the edge between them decides. ValueError for NaN.
+    linear: float of any shape; below 0 and above 1 is clipped. Exact and the same on every machine:
+    a table finds the step or the one below, a comparison with the edge between them decides.
+    ValueError for NaN.
     """
     low, edges = _encoding_tables()
     flat = np.ascontiguousarray(linear, np.float32).reshape(-1)
@@ -112,9 +123,11 @@ def encode_srgb(linear: NDArray[Any]) -> NDArray[np.uint8]:
 def light_from_profile(profile: bytes) -> Light | None:
     """Read an ICC profile made of curves and primaries (ICC.1:2022, 9.2 and 10.6, 10.18).
 
-    That is nearly every profile of a camera, screen or working space (sRGB, Display P3, Adobe RGB, ProPhoto,
-    grey gammas). None for profiles made of tables (printers, scanners), other colour spaces, damaged ones.
-    Read here, not by LittleCMS, because Pillow offers that in 8 bits only: wide primaries would band.
+    That is nearly every profile of a camera, screen or working space (sRGB, Display P3, Adobe RGB,
+    ProPhoto, grey gammas). None for profiles made of tables (printers, scanners), other colour
+    spaces, damaged ones.
+    Read here, not by LittleCMS, because Pillow offers that in 8 bits only: wide primaries would
+        band.
     """
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
@@ -143,7 +156,10 @@ def _read_profile(profile: bytes) -> Light | None:
 
 
 def _simplified(light: Light) -> Light:
-    """The light, or plain SRGB if that is the same to a tenth of an 8-bit step. Unusable curves raise."""
+    """The light, or plain SRGB if that is the same to a tenth of an 8-bit step.
+
+    Unusable curves raise.
+    """
     steps = np.linspace(0, 1, 256)
     ramps = np.stack([curve(steps) for curve in light.curves])
     same_primaries = light.matrix is None or np.abs(light.matrix - np.eye(3)).max() < 4e-4

@@ -1,7 +1,7 @@
 """What a photo tells of itself, and how much of that goes into its drawing.
 
-Tags of the layout of the file (size, orientation, profile, previews) never go along: they would be wrong for
-the drawing. Where the photo was taken is left out unless everything is wanted.
+Tags of the layout of the file (size, orientation, profile, previews) never go along: they would be
+wrong for the drawing. Where the photo was taken is left out unless everything is wanted.
 """
 
 from __future__ import annotations
@@ -20,15 +20,36 @@ _SAFE_INSIDE = frozenset(
     (_DATE_TAKEN, 36880, 36881, 37520, 37521)
 )  # when it was taken: date, offset, fractions
 _COLOUR_SPACE, _SRGB = 40961, 1
-_LAYOUT = frozenset(  # sizes, strips, tiles, resolution, orientation, software, profile, previews, packets
-    (*range(254, 270), *range(273, 285), 296, 301, 305, *range(317, 348), *range(512, 533), 700, 33723, 34377,
-     _EXIF_FOLDER, _GPS_FOLDER, 34675, 50341, 37500, 40961, 40962, 40963, 40965)
-)  # fmt: skip
+# sizes, strips, tiles, resolution, orientation, software, profile, previews, packets
+_LAYOUT = frozenset(
+    (
+        *range(254, 270),
+        *range(273, 285),
+        296,
+        301,
+        305,
+        *range(317, 348),
+        *range(512, 533),
+        700,
+        33723,
+        34377,
+        _EXIF_FOLDER,
+        _GPS_FOLDER,
+        34675,
+        50341,
+        37500,
+        40961,
+        40962,
+        40963,
+        40965,
+    )
+)
 _LONGEST = 60_000  # bytes, as JPEG holds 64 kB
 
 
 def kept(picture: Image | None, which: str) -> Exif | None:
-    """The tags of an open photo that go along: none, safe (title, names, date; no place) or all of EXIF.
+    """The tags of an open photo that go along: none, safe (title, names, date; no place) or all of
+    EXIF.
 
     None if there are none, or if they are too damaged or too many to be written.
     """
@@ -41,7 +62,11 @@ def kept(picture: Image | None, which: str) -> Exif | None:
         old = picture.getexif()
         inside, place = dict(old.get_ifd(_EXIF_FOLDER)), dict(old.get_ifd(_GPS_FOLDER))
         outside = dict(old)
-        if _TITLE not in outside and isinstance(title := outside.get(_DESCRIPTION), str) and title.strip():
+        if (
+            _TITLE not in outside
+            and isinstance(title := outside.get(_DESCRIPTION), str)
+            and title.strip()
+        ):
             outside[_TITLE] = title.strip().encode("utf-16-le") + b"\0\0"
         wanted, wanted_inside = (None, None) if which == "all" else (_SAFE, _SAFE_INSIDE)
         new.update(_chosen(outside, wanted))
@@ -53,7 +78,9 @@ def kept(picture: Image | None, which: str) -> Exif | None:
 
 
 def flat(exif: Exif) -> Exif:
-    """The same without folders, as compressed TIFF cannot be given any; the date becomes that of the file."""
+    """The same without folders, as compressed TIFF cannot be given any; the date becomes that of
+    the file.
+    """
     date = exif.get_ifd(_EXIF_FOLDER).get(_DATE_TAKEN)
     for folder in (_EXIF_FOLDER, _GPS_FOLDER):
         exif.pop(folder, None)
@@ -64,7 +91,10 @@ def flat(exif: Exif) -> Exif:
 
 
 def _add_folder(exif: Exif, folder: int, tags: dict[int, Any]) -> None:
-    """Add tags in a folder of their own. The TIFF writer also wants to see the folder among the tags."""
+    """Add tags in a folder of their own.
+
+    The TIFF writer also wants to see the folder among the tags.
+    """
     if tags:
         exif.get_ifd(folder).update(tags)
         exif[folder] = 0
@@ -72,5 +102,7 @@ def _add_folder(exif: Exif, folder: int, tags: dict[int, Any]) -> None:
 
 def _chosen(tags: dict[int, Any], wanted: frozenset[int] | None) -> dict[int, Any]:
     return {
-        tag: value for tag, value in tags.items() if tag not in _LAYOUT and (wanted is None or tag in wanted)
+        tag: value
+        for tag, value in tags.items()
+        if tag not in _LAYOUT and (wanted is None or tag in wanted)
     }

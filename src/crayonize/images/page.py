@@ -1,4 +1,6 @@
-"""Drawings for a page of paper: the largest sheet of the photo's proportions that the page holds."""
+"""Drawings for a page of paper: the largest sheet of the photo's proportions that the page
+holds.
+"""
 
 from ..settings import Settings
 
@@ -20,12 +22,14 @@ DPI = 300.0
 _MM_PER_INCH = 25.4
 
 
-def fitted(settings: Settings, page: str | None, dpi: float | None, width: int, height: int) -> Settings:
+def fitted(
+    settings: Settings, page: str | None, dpi: float | None, width: int, height: int
+) -> Settings:
     """Settings whose sheet fills a page, upright or turned, for a photo of width x height pixels.
 
     Strokes keep their width in mm: a larger page has more of them.
-    page: a name of PAGES; None leaves the sheet as it is.   dpi: pixels to the inch of paper; None means 300
-    with a page, and without one leaves the size as it is.
+    page: a name of PAGES; None leaves the sheet as it is.   dpi: pixels to the inch of paper; None
+    means 300 with a page, and without one leaves the size as it is.
     """
     sheet_mm = settings.sheet_mm
     if page is not None:

@@ -1,4 +1,6 @@
-"""The way in for pictures: a photo or array becomes linear RGB of the wished size, upright, on its ground."""
+"""The way in for pictures: a photo or array becomes linear RGB of the wished size, upright, on its
+ground.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ Source = str | os.PathLike[str] | Image.Image | NDArray[Any]
 
 FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "AVIF")
 
-_STRIP_PIXELS = 1 << 17  # pixels turned into light at a time: 1.5 MB of float32, which the cache holds
+# pixels turned into light at a time: 1.5 MB of float32, which the cache holds
+_STRIP_PIXELS = 1 << 17
 
 # EXIF orientation -> what turns the stored picture upright.
 _TURNS: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
@@ -45,17 +48,18 @@ def read_linear(
     max_side: int | None = None,
     ground: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> NDArray[np.float32]:
-    """Read a picture as light: upright, in sRGB primaries, laid on the ground, reduced to the size needed.
+    """Read a picture as light: upright, in sRGB primaries, laid on the ground, reduced to the size
+    needed.
 
-    source: a path (JPEG, PNG, WebP, TIFF, AVIF; HEIC with the extra `heic`; of a moving picture the first
-        frame), an open Pillow image (of 8 bits if in colour), or an array (h, w), (h, w, 1), (h, w, 3) or
-        (h, w, 4) of uint8, uint16 or sRGB-encoded floats 0..1.
-    max_side: longest side of the result in pixels; None keeps the size, and nothing is ever enlarged. Each
-        pixel of the result is the mean of the area it covers, taken in linear light.
+    source: a path (JPEG, PNG, WebP, TIFF, AVIF; HEIC with the extra `heic`; of a moving picture the
+        first frame), an open Pillow image (of 8 bits if in colour), or an array (h, w), (h, w, 1),
+        (h, w, 3) or (h, w, 4) of uint8, uint16 or sRGB-encoded floats 0..1.
+    max_side: longest side of the result in pixels; None keeps the size, and nothing is ever
+        enlarged. Each pixel of the result is the mean of the area it covers, taken in linear light.
     ground: linear RGB behind transparent pixels.
     Returns linear RGB, float32 (h, w, 3) in [0, 1], C-contiguous, writable, ours alone.
-    ValueError, one line with the name of the file, for anything that is not a whole picture within the
-    limits MAX_PIXELS and MAX_SIDE of scan.py.
+    ValueError, one line with the name of the file, for anything that is not a whole picture within
+    the limits MAX_PIXELS and MAX_SIDE of scan.py.
     """
     with open_photo(source) as photo:
         return photo.light(max_side, ground)
@@ -65,7 +69,8 @@ def read_linear(
 class Photo:
     """A photo whose header has been read, and whose light can be taken once.
 
-    width, height: pixels as stored.   decoding: bytes that taking the light needs beside the light itself.
+    width, height: pixels as stored.   decoding: bytes that taking the light needs beside the light
+        itself.
     picture: its header as Pillow has it, None for an array.
     """
 
@@ -117,14 +122,18 @@ def open_photo(source: Source | Photo) -> Iterator[Photo]:
 def _photo(source: Source, picture: Image.Image, name: str, file: IO[bytes] | None) -> Photo:
     deep = ";16" in repr(getattr(picture, "tile", ""))
     decoding = memory.decoding(picture.format, picture.width * picture.height, deep)
-    return Photo(source, *picture.size, decoding, picture, name, lambda: scan_picture(picture, file))
+    return Photo(
+        source, *picture.size, decoding, picture, name, lambda: scan_picture(picture, file)
+    )
 
 
 def _light(
     scan: Scan, max_side: int | None, ground: tuple[float, float, float]
 ) -> NDArray[np.float32]:
     if max_side is not None and max_side < 1:
-        raise ValueError(f"max_side is {max_side}; it must be at least 1 pixel, or None to keep the size")
+        raise ValueError(
+            f"max_side is {max_side}; it must be at least 1 pixel, or None to keep the size"
+        )
     under = np.array(ground, np.float32)
     if under.shape != (3,) or not ((under >= 0) & (under <= 1)).all():
         raise ValueError(f"ground is {ground!r}; it must be three numbers from 0 to 1 (linear RGB)")
@@ -133,7 +142,10 @@ def _light(
 
 @contextmanager
 def open_picture(path: str | os.PathLike[str]) -> Iterator[tuple[Image.Image, IO[bytes]]]:
-    """Open a picture by our own handle, header only: (Pillow image, file). Names itself in ValueErrors."""
+    """Open a picture by our own handle, header only: (Pillow image, file).
+
+    Names itself in ValueErrors.
+    """
     with _named(shown(path)), _opened(path) as file:
         picture = _identify(file)
         check_size(picture.width, picture.height)
@@ -155,7 +167,9 @@ def _named(name: str) -> Iterator[None]:
 
 
 def _opened(path: str | os.PathLike[str]) -> IO[bytes]:
-    """The file, if it is one: opening a pipe would wait for ever, opening a device may set it going."""
+    """The file, if it is one: opening a pipe would wait for ever, opening a device may set it
+    going.
+    """
     try:
         if stat.S_ISREG(os.stat(path).st_mode):
             return open(path, "rb")
@@ -186,7 +200,9 @@ def _open_heic(file: IO[bytes]) -> Image.Image:
     try:
         import_module("pi_heif").register_heif_opener()
     except ImportError as error:
-        raise ValueError('seems to be a HEIC picture; to read it: pip install "crayonize[heic]"') from error
+        raise ValueError(
+            'seems to be a HEIC picture; to read it: pip install "crayonize[heic]"'
+        ) from error
     try:
         return _open_unlimited(file, ("HEIF",))
     except UnidentifiedImageError as error:
@@ -196,7 +212,9 @@ def _open_heic(file: IO[bytes]) -> Image.Image:
 
 
 def _open_unlimited(file: IO[bytes], formats: tuple[str, ...]) -> Image.Image:
-    """Image.open without Pillow's global limit (warning at 89, end at 179 million); ours is check_size."""
+    """Image.open without Pillow's global limit (warning at 89, end at 179 million); ours is
+    check_size.
+    """
     file.seek(0)
     with _pillow_limit, damage_named():
         before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
@@ -224,7 +242,9 @@ def _develop(scan: Scan, max_side: int | None, ground: NDArray[np.float32]) -> N
     return out if turn is None else np.array(turn(out), order="C")
 
 
-def _strip_reader(scan: Scan, ground: NDArray[np.float32]) -> Callable[[int, int], NDArray[np.float32]]:
+def _strip_reader(
+    scan: Scan, ground: NDArray[np.float32]
+) -> Callable[[int, int], NDArray[np.float32]]:
     """(top, bottom) -> linear RGB (bottom - top, width, 3) of these rows over the ground."""
     first = scan.rows(0, 1)
     channels = 3 if first.shape[2] > 2 else 1

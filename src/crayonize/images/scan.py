@@ -1,4 +1,6 @@
-"""Decoded pictures as strips of stored values, with all that is needed to know what the values mean."""
+"""Decoded pictures as strips of stored values, with all that is needed to know what the values
+mean.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,18 @@ from .icc import SRGB, Light, light_from_profile
 
 MAX_SIDE = 1_000_000
 
-_OVERSHOOT = 0.1  # floats of an array may leave 0..1 by this much (sharpening, resampling) and are clipped
-_HIGHLIGHTS = 8.0  # floats of a TIFF up to here are 0..1 with highlights; beyond, 0..255 or 0..65535
+# floats of an array may leave 0..1 by this much (sharpening, resampling) and are clipped
+_OVERSHOOT = 0.1
+# floats of a TIFF up to here are 0..1 with highlights; beyond, 0..255 or 0..65535
+_HIGHLIGHTS = 8.0
 
-_TIFF_BITS, _TIFF_PHOTOMETRIC, _TIFF_SAMPLE_FORMAT, _TIFF_SUBFILE, _DNG_VERSION = 258, 262, 339, 254, 50706
+_TIFF_BITS, _TIFF_PHOTOMETRIC, _TIFF_SAMPLE_FORMAT, _TIFF_SUBFILE, _DNG_VERSION = (
+    258,
+    262,
+    339,
+    254,
+    50706,
+)
 _EXIF_ORIENTATION = 274
 
 
@@ -42,10 +52,14 @@ class Scan:
 def check_size(width: int, height: int) -> None:
     """ValueError for a picture of no pixels, or of more than we decode."""
     if min(width, height) < 1:
-        raise ValueError(f"is empty ({width} x {height} pixels); a picture needs at least one pixel")
+        raise ValueError(
+            f"is empty ({width} x {height} pixels); a picture needs at least one pixel"
+        )
     if width * height > MAX_PIXELS or max(width, height) > MAX_SIDE:
         most = f"{MAX_PIXELS // 1_000_000} million, {MAX_SIDE} a side"
-        raise ValueError(f"has {width} x {height} pixels; at most {most} are taken: reduce it first")
+        raise ValueError(
+            f"has {width} x {height} pixels; at most {most} are taken: reduce it first"
+        )
 
 
 @contextmanager
@@ -61,7 +75,10 @@ def damage_named() -> Iterator[None]:
 
 
 def scan_picture(picture: Image.Image, file: IO[bytes] | None = None) -> Scan:
-    """Decode a Pillow image and choose how its values are to be read. file: where it comes from, if known."""
+    """Decode a Pillow image and choose how its values are to be read.
+
+    file: where it comes from, if known.
+    """
     if _tag(picture, _DNG_VERSION, 0) or _tag(picture, _TIFF_SUBFILE, 0) & 1:
         raise ValueError(
             "is a camera raw file or holds only a preview; develop it to JPEG, PNG or TIFF first"
@@ -81,7 +98,10 @@ def scan_picture(picture: Image.Image, file: IO[bytes] | None = None) -> Scan:
     key = picture.info.get("transparency") if picture.mode in ("1", "L", "RGB", "I;16") else None
     key = (key,) if isinstance(key, int) else key
     return replace(
-        scan, light=light, key=key if isinstance(key, tuple) else None, orientation=_orientation(picture)
+        scan,
+        light=light,
+        key=key if isinstance(key, tuple) else None,
+        orientation=_orientation(picture),
     )
 
 
@@ -101,7 +121,9 @@ def exif_tag(picture: Image.Image, number: int) -> Any:
 
 
 def _orientation(picture: Image.Image) -> int:
-    """The EXIF orientation still to be applied: Pillow itself turns TIFF on decoding, and drops the tag."""
+    """The EXIF orientation still to be applied: Pillow itself turns TIFF on decoding, and drops the
+    tag.
+    """
     value = exif_tag(picture, _EXIF_ORIENTATION)
     return value if isinstance(value, int) else 1
 
@@ -110,12 +132,22 @@ def _mode_wanted(picture: Image.Image) -> str:
     """The plain 8-bit mode that holds all a picture has: L, LA, RGB or RGBA."""
     if picture.mode == "P" and picture.has_transparency_data:
         return "RGBA"
-    plain = {"1": "L", "L": "L", "LA": "LA", "La": "LA", "PA": "RGBA", "RGBA": "RGBA", "RGBa": "RGBA"}
+    plain = {
+        "1": "L",
+        "L": "L",
+        "LA": "LA",
+        "La": "LA",
+        "PA": "RGBA",
+        "RGBA": "RGBA",
+        "RGBa": "RGBA",
+    }
     return plain.get(picture.mode, "RGB")
 
 
 def _color_management(picture: Image.Image) -> tuple[Light, ImageCms.ImageCmsTransform | None]:
-    """What the embedded profile asks for: curves and primaries, or tables by LittleCMS; broken is sRGB."""
+    """What the embedded profile asks for: curves and primaries, or tables by LittleCMS; broken is
+    sRGB.
+    """
     profile = picture.info.get("icc_profile") or b""
     mode = "CMYK" if picture.mode == "CMYK" else _mode_wanted(picture)
     light = light_from_profile(profile)
@@ -156,7 +188,8 @@ def _scan_deep_grey(picture: Image.Image) -> Scan:
     if values.dtype.kind == "u":
         full = float(2 ** min(_tag(picture, _TIFF_BITS, 16), 16) - 1)
         values = values.astype(np.uint16, copy=False)
-        if _tag(picture, _TIFF_PHOTOMETRIC, 1) == 0:  # white is zero; Pillow turns this over for 8 bits only
+        # white is zero; Pillow turns this over for 8 bits only
+        if _tag(picture, _TIFF_PHOTOMETRIC, 1) == 0:
             values = int(full) - values
     else:
         if values.dtype.kind == "i" and _tag(picture, _TIFF_SAMPLE_FORMAT, 2) == 1:  # unsigned
@@ -166,9 +199,13 @@ def _scan_deep_grey(picture: Image.Image) -> Scan:
 
 
 def _full_scale(low: float, high: float, kind: str) -> float:
-    """The value that stands for white: the smallest usual full scale that holds the brightest pixel."""
+    """The value that stands for white: the smallest usual full scale that holds the brightest
+    pixel.
+    """
     if not np.isfinite([low, high]).all():
-        raise ValueError("holds values that are not finite numbers; every value must be a brightness")
+        raise ValueError(
+            "holds values that are not finite numbers; every value must be a brightness"
+        )
     if kind == "f" and high <= _HIGHLIGHTS:
         return 1.0
     usual = (255.0, 65535.0, 2.0**31 - 1, 2.0**32 - 1)
@@ -186,25 +223,38 @@ def _is_deep_color(picture: Image.Image, file: IO[bytes]) -> bool:
 
 
 def _scan_deep_color(picture: Image.Image, file: IO[bytes]) -> Scan | None:
-    """16-bit RGB decoded once more, by OpenCV from memory; None if that is not the picture Pillow found."""
+    """16-bit RGB decoded once more, by OpenCV from memory; None if that is not the picture Pillow
+    found.
+    """
     file.seek(0)
     try:
         values = cv2.imdecode(np.frombuffer(file.read(), np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         return None
     order = [2, 1, 0, 3][: len(picture.mode)]
-    if values is None or values.dtype != np.uint16 or values.ndim != 3 or values.shape[2] < len(order):
+    if (
+        values is None
+        or values.dtype != np.uint16
+        or values.ndim != 3
+        or values.shape[2] < len(order)
+    ):
         return None
-    scan = Scan(values.shape[0], values.shape[1], lambda top, bottom: values[top:bottom, :, order], 65535.0)
+    scan = Scan(
+        values.shape[0], values.shape[1], lambda top, bottom: values[top:bottom, :, order], 65535.0
+    )
     return scan if _same_picture(scan, picture) else None
 
 
 def _same_picture(scan: Scan, picture: Image.Image) -> bool:
-    """Whether up to 128 rows have the upper bytes Pillow found: OpenCV misreads some layouts of TIFF."""
+    """Whether up to 128 rows have the upper bytes Pillow found: OpenCV misreads some layouts of
+    TIFF.
+    """
     if (scan.width, scan.height) != picture.size:
         return False
     for y in range(0, scan.height, max(1, scan.height // 64)):
-        if not np.array_equal(scan.rows(y, y + 1) >> 8, np.asarray(picture.crop((0, y, scan.width, y + 1)))):
+        if not np.array_equal(
+            scan.rows(y, y + 1) >> 8, np.asarray(picture.crop((0, y, scan.width, y + 1)))
+        ):
             return False
     return True
 
@@ -222,7 +272,9 @@ def scan_array(values: NDArray[Any]) -> Scan:
     if values.dtype.kind == "f":
         low, high = float(values.min()), float(values.max())
         if not (low >= -_OVERSHOOT and high <= 1 + _OVERSHOOT):  # also catches NaN
-            raise ValueError(f"holds floats from {low:g} to {high:g}; they must be finite and lie in 0..1")
+            raise ValueError(
+                f"holds floats from {low:g} to {high:g}; they must be finite and lie in 0..1"
+            )
         return _strips_of(values, 1.0)
     if values.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"is of type {values.dtype}; it must be uint8, uint16 or float")

@@ -1,4 +1,6 @@
-"""The way out for pictures: whole or not at all, settings inside, the same bytes for the same picture."""
+"""The way out for pictures: whole or not at all, settings inside, the same bytes for the same
+picture.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,14 @@ from .scan import exif_tag
 SOFTWARE = "crayonize"  # the name under which settings are found again
 Settings = dict[str, str | int | float]
 
-_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP", ".tif": "TIFF", ".tiff": "TIFF"}
+_FORMATS = {
+    ".png": "PNG",
+    ".jpg": "JPEG",
+    ".jpeg": "JPEG",
+    ".webp": "WEBP",
+    ".tif": "TIFF",
+    ".tiff": "TIFF",
+}
 _LONGEST_SIDE = {"JPEG": 65535, "WEBP": 16383}
 _EXIF_DESCRIPTION, _EXIF_SOFTWARE = 270, 305
 _EXIF_X_RESOLUTION, _EXIF_Y_RESOLUTION, _EXIF_RESOLUTION_UNIT, _EXIF_INCH = 282, 283, 296, 2
@@ -36,10 +45,12 @@ def write_image(
     quality: int = 95,
     kept: Image.Exif | None = None,
 ) -> None:
-    """Write a picture so that its name never stands for half a file: the old one, the new one, or none.
+    """Write a picture so that its name never stands for half a file: the old one, the new one, or
+    none.
 
     path: PNG, JPEG, WebP or TIFF by its suffix; a link is replaced, never written through.
-    srgb8: uint8 (h, w, 3), sRGB-encoded. settings: stored inside, see read_settings. dpi: pixels per inch on
+    srgb8: uint8 (h, w, 3), sRGB-encoded. settings: stored inside, see read_settings. dpi: pixels
+        per inch on
     paper. quality: 1..100, of JPEG and WebP. kept: tags of the photo, see metadata.py.
     The sRGB profile goes in, no time does.
     ValueError for what the caller can mend; OSError with the path if the disk is full or refuses.
@@ -52,7 +63,9 @@ def write_image(
 
 
 def file_format(path: str | os.PathLike[str]) -> str:
-    """The format that the suffix of an output stands for ("PNG", "JPEG", "WEBP", "TIFF"), or ValueError."""
+    """The format that the suffix of an output stands for ("PNG", "JPEG", "WEBP", "TIFF"), or
+    ValueError.
+    """
     suffix = Path(os.fsdecode(path)).suffix.lower()
     if suffix not in _FORMATS:
         raise ValueError(
@@ -62,7 +75,9 @@ def file_format(path: str | os.PathLike[str]) -> str:
 
 
 def same_file(a: str | os.PathLike[str], b: str | os.PathLike[str]) -> bool:
-    """Whether two paths lead to one file, by any link, hard link or spelling the file system takes as one."""
+    """Whether two paths lead to one file, by any link, hard link or spelling the file system takes
+    as one.
+    """
     try:
         return os.path.samefile(a, b)
     except OSError:  # one or both do not exist yet
@@ -70,9 +85,15 @@ def same_file(a: str | os.PathLike[str], b: str | os.PathLike[str]) -> bool:
 
 
 def read_settings(path: str | os.PathLike[str]) -> Settings:
-    """The settings write_image stored in a picture, empty if there are none; ValueError if no picture."""
+    """The settings write_image stored in a picture, empty if there are none; ValueError if no
+    picture.
+    """
     with open_picture(path) as (picture, _):
-        text = picture.info.get(SOFTWARE) if picture.format == "PNG" else exif_tag(picture, _EXIF_DESCRIPTION)
+        text = (
+            picture.info.get(SOFTWARE)
+            if picture.format == "PNG"
+            else exif_tag(picture, _EXIF_DESCRIPTION)
+        )
     try:
         found = json.loads(text or "")
         found = found if picture.format == "PNG" else found[SOFTWARE]
@@ -85,16 +106,25 @@ def holds_other_picture(path: str | os.PathLike[str]) -> bool:
     """Whether there is a picture here that write_image did not write."""
     try:
         with open_picture(path) as (picture, _):
-            by = picture.info.get("Software") if picture.format == "PNG" else exif_tag(picture, _EXIF_SOFTWARE)
+            by = (
+                picture.info.get("Software")
+                if picture.format == "PNG"
+                else exif_tag(picture, _EXIF_SOFTWARE)
+            )
             return by != SOFTWARE
     except (OSError, ValueError):
         return False
 
 
 def _encode(
-    srgb8: NDArray[np.uint8], format_: str, name: str, settings: Settings, dpi: float | None, quality: int,
+    srgb8: NDArray[np.uint8],
+    format_: str,
+    name: str,
+    settings: Settings,
+    dpi: float | None,
+    quality: int,
     kept: Image.Exif | None,
-) -> BytesIO:  # fmt: skip
+) -> BytesIO:
     """The whole file in memory, where no full disk can hurt it."""
     if srgb8.dtype != np.uint8 or srgb8.ndim != 3 or srgb8.shape[2] != 3 or srgb8.size == 0:
         raise ValueError(
@@ -103,7 +133,8 @@ def _encode(
     longest = _LONGEST_SIDE.get(format_, max(srgb8.shape))
     if max(srgb8.shape) > longest:
         raise ValueError(
-            f"{name}: {format_} holds at most {longest} pixels a side, not {max(srgb8.shape)}; use PNG"
+            f"{name}: {format_} holds at most {longest} pixels a side, not {max(srgb8.shape)}; use "
+            "PNG"
         )
     if dpi is not None and not 1 <= dpi <= 65535:
         raise ValueError(f"{name}: dpi is {dpi}; it must lie between 1 and 65535")
@@ -112,7 +143,9 @@ def _encode(
     try:
         text = json.dumps(settings, sort_keys=True, allow_nan=False) if settings else None
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{name}: settings: {error}; they must be text or finite numbers") from error
+        raise ValueError(
+            f"{name}: settings: {error}; they must be text or finite numbers"
+        ) from error
     data, options = BytesIO(), _options(format_, text, dpi, quality, kept)
     try:
         Image.fromarray(srgb8).save(data, format_, **options)
@@ -135,7 +168,9 @@ def _options(
         if kept is not None:
             options["exif"] = kept
     else:
-        options["exif"] = _exif(text, dpi, flat(kept) if kept is not None and format_ == "TIFF" else kept)
+        options["exif"] = _exif(
+            text, dpi, flat(kept) if kept is not None and format_ == "TIFF" else kept
+        )
     if dpi is not None and format_ in ("PNG", "JPEG"):
         options["dpi"] = (dpi, dpi)
     if format_ == "TIFF":
@@ -148,7 +183,9 @@ def _options(
 
 
 def _exif(text: str | None, dpi: float | None, kept: Image.Exif | None) -> Image.Exif:
-    """The settings as the picture's description, the one text tag that JPEG, WebP and TIFF all keep."""
+    """The settings as the picture's description, the one text tag that JPEG, WebP and TIFF all
+    keep.
+    """
     exif = Image.Exif() if kept is None else kept
     exif[_EXIF_SOFTWARE] = SOFTWARE
     if text is not None:

@@ -4,7 +4,9 @@ import os
 
 
 def allowed() -> int:
-    """Cores this process may use: fewer than the machine has under taskset, in a container or batch system."""
+    """Cores this process may use: fewer than the machine has under taskset, in a container or batch
+    system.
+    """
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # a system that binds no process to cores

@@ -1,8 +1,10 @@
 """The user's cache folder: compiled kernels and measured tables.
 
-Entries are written whole under their final name and begin with a checksum, so that a damaged one counts as
-missing, and any number of processes may write at once. Compiled kernels are code: a folder that somebody
-else could write to is left alone. Nothing here raises; without a usable folder nothing is kept.
+Entries are written whole under their final name and begin with a checksum, so that a damaged one
+counts as
+missing, and any number of processes may write at once. Compiled kernels are code: a folder that
+somebody else could write to is left alone. Nothing here raises; without a usable folder nothing is
+kept.
 
 CRAYONIZE_CACHE names the folder, CRAYONIZE_NO_CACHE=1 goes without.
 """
@@ -43,7 +45,11 @@ def _places() -> Iterator[Path]:
     with contextlib.suppress(RuntimeError):  # no home
         home = Path.home()
         if sys.platform == "win32":
-            yield Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "crayonize" / "cache"
+            yield (
+                Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+                / "crayonize"
+                / "cache"
+            )
         elif sys.platform == "darwin":
             yield home / "Library" / "Caches" / "crayonize"
         else:
@@ -58,7 +64,9 @@ def _ours(path: Path) -> bool:
     status = path.stat()
     if not stat.S_ISDIR(status.st_mode):
         return False
-    return not hasattr(os, "getuid") or (status.st_uid in (os.getuid(), 0) and not status.st_mode & 0o022)
+    return not hasattr(os, "getuid") or (
+        status.st_uid in (os.getuid(), 0) and not status.st_mode & 0o022
+    )
 
 
 def read(path: Path) -> bytes | None:

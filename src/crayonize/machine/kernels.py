@@ -1,8 +1,8 @@
 """Compiled kernels in the cache folder, in place of numba's own disk cache.
 
-That one does not notice an edit in another file, and raises where no folder can be written to. Ours finds a
-kernel by the source of its whole room, and uses numba's inner names; with a numba that has others, kernels
-are compiled anew in each process, and nothing else is lost.
+That one does not notice an edit in another file, and raises where no folder can be written to. Ours
+finds a kernel by the source of its whole room, and uses numba's inner names; with a numba that has
+others, kernels are compiled anew in each process, and nothing else is lost.
 """
 
 import contextlib
@@ -27,7 +27,8 @@ IN_USE_S = 3600.0  # a folder used within this time is never cleaned up
 
 
 def keep_kernels() -> None:
-    """Let the kernels of all modules loaded so far be kept in the cache folder, whatever happens to it.
+    """Let the kernels of all modules loaded so far be kept in the cache folder, whatever happens to
+    it.
 
     To be called again when modules with further kernels have been imported.
     """
@@ -60,7 +61,9 @@ def _modules() -> list[ModuleType]:
 
 
 def _clean_up(place: Path) -> None:
-    """Note that a folder of kernels is in use, and remove those of machines and versions long out of use."""
+    """Note that a folder of kernels is in use, and remove those of machines and versions long out
+    of use.
+    """
     with contextlib.suppress(OSError):
         if place.exists():
             os.utime(place)
@@ -81,15 +84,20 @@ def _remove_old(paths: Iterable[Path], keep: int) -> None:
 @functools.cache
 def _announce(place: Path) -> None:
     """Say that it takes a while, and whether it will next time."""
-    again = "once" if os.access(place, os.W_OK) else "as at each start, for no cache folder can be written to"
+    again = (
+        "once"
+        if os.access(place, os.W_OK)
+        else "as at each start, for no cache folder can be written to"
+    )
     logging.getLogger("crayonize").info("compiling for this machine, %s ...", again)
 
 
 class _Kept:
     """The disk cache of one kernel, as numba's dispatcher asks for it (numba.core.caching._Cache).
 
-    An entry's name holds the argument types and a hash of all source that went into it: of the room (folder) of
-    the kernel and of the rooms of the kernels it may call, for constants come from files beside them.
+    An entry's name holds the argument types and a hash of all source that went into it: of the room
+    (folder) of the kernel and of the rooms of the kernels it may call, for constants come from
+    files beside them.
     """
 
     cache_path = None
@@ -99,7 +107,8 @@ class _Kept:
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The kernel compiled for the argument types `sig`, or None."""
-        with contextlib.suppress(Exception):  # a strange entry, or a strange numba: it is compiled anew
+        # a strange entry, or a strange numba: it is compiled anew
+        with contextlib.suppress(Exception):
             from numba.core import compiler
             from numba.core.runtime.nrt import rtsys
 
@@ -123,7 +132,9 @@ class _Kept:
                 _remove_old(path.parent.glob(f"{path.stem}.*"), KEEP)
 
     def _path(self, sig: Any) -> Path:
-        name = f"{self._function.__module__}.{self._function.__qualname__}".replace("<", "").replace(">", "")
+        name = f"{self._function.__module__}.{self._function.__qualname__}".replace(
+            "<", ""
+        ).replace(">", "")
         types = hashlib.sha256(repr(sig).encode()).hexdigest()[:12]
         return self._place / f"{name}-{types}.{_source_hash(self._function.__module__)}"
 
@@ -139,7 +150,9 @@ class _Kept:
 
 @functools.cache
 def _source_hash(module: str) -> str:
-    """Hash of all source in the room of a module, in the rooms of all kernels it can see, and so on."""
+    """Hash of all source in the room of a module, in the rooms of all kernels it can see, and so
+    on.
+    """
     from numba.core.dispatcher import Dispatcher
 
     from stroke_gen import jit

@@ -1,4 +1,6 @@
-"""How much memory a drawing takes and how much there is, so that one too large is refused before any work."""
+"""How much memory a drawing takes and how much there is, so that one too large is refused before
+any work.
+"""
 
 import ctypes
 import math
@@ -6,13 +8,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-MAX_PIXELS = 250_000_000  # of a photo; more is refused before decoding: 250 million pixels decode into about 1 GB
-BYTES_PER_CELL = 75  # the sheet 57, its picture 3, which takes 2 (PNG) to 16 (WebP) more on its way into a file
+# of a photo; more is refused before decoding: 250 million pixels decode into about 1 GB
+MAX_PIXELS = 250_000_000
+# the sheet 57, its picture 3, which takes 2 (PNG) to 16 (WebP) more on its way into a file
+BYTES_PER_CELL = 75
 BYTES_PER_FILMED_CELL = 12  # the light on the sheet, which is kept while it is filmed
 OVERHEAD = 320_000_000  # the libraries, the reduced photo, the planner's work, the strokes
 
-# Bytes a pixel while a photo is decoded and reduced, measured on 50 million pixels. Colour of 16 bits is
-# decoded twice.
+# Bytes a pixel while a photo is decoded and reduced, measured on 50 million pixels. Colour of 16
+# bits is decoded twice.
 _DECODING = {"JPEG": 7, "PNG": 7, "TIFF": 7, "WEBP": 16, "AVIF": 10, "HEIF": 10}
 _DEEP = 18
 
@@ -20,14 +24,20 @@ _M_ARENA_MAX = -8  # of glibc's malloc.h
 
 
 def decoding(format_: str | None, pixels: int, deep: bool = False) -> int:
-    """Bytes taken, before there is a sheet, to read a photo. deep: colour of 16 bits. No format: it has been read."""
+    """Bytes taken, before there is a sheet, to read a photo.
+
+    deep: colour of 16 bits. No format: it has been read.
+    """
     if format_ is None:
         return 0
     return (_DEEP if deep else _DECODING.get(format_, _DEEP)) * pixels
 
 
-def check_fits(rows: int, cols: int, *, photo: int = 0, filmed: bool = False, available: int | None = None) -> None:
-    """ValueError naming the figures if a drawing on a sheet of rows x cols cells does not fit into memory.
+def check_fits(
+    rows: int, cols: int, *, photo: int = 0, filmed: bool = False, available: int | None = None
+) -> None:
+    """ValueError naming the figures if a drawing on a sheet of rows x cols cells does not fit into
+    memory.
 
     photo: bytes that reading the photo takes.   available: bytes, if not what the machine has.
     """
@@ -41,7 +51,8 @@ def check_fits(rows: int, cols: int, *, photo: int = 0, filmed: bool = False, av
         fitting = int(max(rows, cols) * math.sqrt((free - OVERHEAD) / (rows * cols * per_cell)))
         advice = f"; a size of {fitting} would fit" if fitting >= 16 else ""
         raise ValueError(
-            f"size: {cols} x {rows} cells need {_figures(OVERHEAD + rows * cols * per_cell, free)}{advice}"
+            f"size: {cols} x {rows} cells need "
+            f"{_figures(OVERHEAD + rows * cols * per_cell, free)}{advice}"
         )
 
 
@@ -52,8 +63,8 @@ def _figures(needed: int, free: int) -> str:
 def share_heaps() -> None:
     """Let all threads take memory from two heaps; a system without such a choice is left as it is.
 
-    The C library of Linux has eight heaps a core, and what one thread has given back no other gets: a picture on
-    four cores takes 60 MB more, in the same time.
+    The C library of Linux has eight heaps a core, and what one thread has given back no other gets:
+    a picture on four cores takes 60 MB more, in the same time.
     """
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, 2)
@@ -106,4 +117,6 @@ def _left(most: Path, now: Path, stat: Path) -> Iterator[int]:
         limit = int(most.read_text())
         used = int(now.read_text())
         rows = dict(line.split() for line in stat.read_text().splitlines())
-        yield max(0, limit - used + int(rows.get("total_inactive_file", rows.get("inactive_file", 0))))
+        yield max(
+            0, limit - used + int(rows.get("total_inactive_file", rows.get("inactive_file", 0)))
+        )

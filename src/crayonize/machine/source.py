@@ -1,6 +1,7 @@
 """Which version of the program made something: a short name for the source it depends on.
 
-A version number would have to be thought of with every change of the wax; the source cannot be forgotten.
+A version number would have to be thought of with every change of the wax; the source cannot be
+forgotten.
 """
 
 import functools

@@ -1,6 +1,8 @@
-"""The box of crayons used, drawn beside or below the drawing: a patch of real wax each, its name, what it gave.
+"""The box of crayons used, drawn beside or below the drawing: a patch of real wax each, its name,
+what it gave.
 
-The panel is a drawing of its own on the same paper, rubbed by the same simulator; only the words are type.
+The panel is a drawing of its own on the same paper, rubbed by the same simulator; only the words
+are type.
 """
 
 from collections.abc import Sequence
@@ -38,7 +40,11 @@ class Used:
     def amount(self) -> str:
         """How much of a stick that is."""
         length = self.given_mm3 / STICK_MM2
-        return f"{length:.0f} mm of the stick" if length >= 9.95 else f"{max(length, 0.1):.1f} mm of the stick"
+        return (
+            f"{length:.0f} mm of the stick"
+            if length >= 9.95
+            else f"{max(length, 0.1):.1f} mm of the stick"
+        )
 
 
 def used_crayons(palette: Palette, given_mm3: dict[str, float]) -> list[Used]:
@@ -47,8 +53,12 @@ def used_crayons(palette: Palette, given_mm3: dict[str, float]) -> list[Used]:
     return sorted(used, key=lambda one: darkness(one.crayon))
 
 
-def with_legend(picture: Picture, drawing: Drawing, easel: pipeline.Easel, *, light: bool = True) -> Picture:
-    """The picture of a drawing with the crayons used: below it if it is wide, beside it if it is high."""
+def with_legend(
+    picture: Picture, drawing: Drawing, easel: pipeline.Easel, *, light: bool = True
+) -> Picture:
+    """The picture of a drawing with the crayons used: below it if it is wide, beside it if it is
+    high.
+    """
     rows, cols = picture.shape[:2]
     used = used_crayons(easel.box.palette, easel.box.given_mm3)
     unit = max(rows, cols) / 297  # pixels to a "mm" of the layout
@@ -56,17 +66,28 @@ def with_legend(picture: Picture, drawing: Drawing, easel: pipeline.Easel, *, li
     if cols >= rows:
         across = max(1, int((cols / unit - 2 * MARGIN) // ENTRY[0]))
         high = round((2 * MARGIN + TITLE + ENTRY[1] * -(-len(used) // across)) * unit)
-        return np.concatenate([picture, panel(drawing, used, cols, high, unit, title, across, light=light)])
+        return np.concatenate(
+            [picture, panel(drawing, used, cols, high, unit, title, across, light=light)]
+        )
     down = max(1, int((rows / unit - 2 * MARGIN - TITLE) // ENTRY[1]))
     across = -(-max(1, len(used)) // down)
     wide = round((2 * MARGIN + ENTRY[0] * across) * unit)
-    return np.concatenate([picture, panel(drawing, used, wide, rows, unit, title, across, light=light)], 1)
+    return np.concatenate(
+        [picture, panel(drawing, used, wide, rows, unit, title, across, light=light)], 1
+    )
 
 
 def panel(
-    drawing: Drawing, used: Sequence[Used], width: int, height: int, unit: float, title: str, across: int, *,
+    drawing: Drawing,
+    used: Sequence[Used],
+    width: int,
+    height: int,
+    unit: float,
+    title: str,
+    across: int,
+    *,
     light: bool = True,
-) -> Picture:  # fmt: skip
+) -> Picture:
     """The crayons in rows of `across`, on a piece of the drawing's paper of width x height pixels.
 
     unit: pixels to a "mm" of the layout.
@@ -74,8 +95,13 @@ def panel(
     cell_mm = _cell_mm(drawing, unit)
     wide = (width / unit - 2 * MARGIN) / across
     top = MARGIN + (TITLE if title else 0)
-    places = [(MARGIN + (i % across) * wide, top + (i // across) * ENTRY[1]) for i in range(len(used))]
-    strokes = [patch(x, y, *PATCH, one.crayon.name, unit * cell_mm) for (x, y), one in zip(places, used, strict=True)]
+    places = [
+        (MARGIN + (i % across) * wide, top + (i // across) * ENTRY[1]) for i in range(len(used))
+    ]
+    strokes = [
+        patch(x, y, *PATCH, one.crayon.name, unit * cell_mm)
+        for (x, y), one in zip(places, used, strict=True)
+    ]
     made = scrap(drawing, strokes, width, height, cell_mm, light=light)
     lettering = Lettering(made, unit)
     lettering.write(MARGIN, MARGIN, title, 1.25, width / unit - 2 * MARGIN)
@@ -86,16 +112,32 @@ def panel(
 
 
 def scrap(
-    drawing: Drawing, strokes: Sequence[Stroke], width: int, height: int, cell_mm: float, *, light: bool = True
+    drawing: Drawing,
+    strokes: Sequence[Stroke],
+    width: int,
+    height: int,
+    cell_mm: float,
+    *,
+    light: bool = True,
 ) -> Picture:
     """A piece of the drawing's paper, width x height pixels of `cell_mm`, with strokes on it."""
-    piece = Drawing(width * cell_mm, height * cell_mm, drawing.paper, drawing.palette, tuple(strokes),
-                    drawing.physics, drawing.seed)  # fmt: skip
+    piece = Drawing(
+        width * cell_mm,
+        height * cell_mm,
+        drawing.paper,
+        drawing.palette,
+        tuple(strokes),
+        drawing.physics,
+        drawing.seed,
+    )
     return encode_srgb(pipeline.draw(piece, max(width, height)).picture(light))[:height, :width]
 
 
 def patch(x: float, y: float, width: float, height: float, crayon: str, scale: float) -> Stroke:
-    """A patch of wax: one slanting zigzag, as a child tries a crayon. scale: mm of paper to a mm of the layout."""
+    """A patch of wax: one slanting zigzag, as a child tries a crayon.
+
+    scale: mm of paper to a mm of the layout.
+    """
     tip_mm = 0.28 * height
     lines = np.arange(0, width - tip_mm, 0.4 * tip_mm)
     top = np.arange(len(lines)) % 2 == 0
@@ -132,21 +174,33 @@ class Lettering:
         self.ink = PALE if dark else DARK
 
     def write(
-        self, x: float, y: float, text: str, size: float = 1.0, room: float | None = None, anchor: str = "la"
+        self,
+        x: float,
+        y: float,
+        text: str,
+        size: float = 1.0,
+        room: float | None = None,
+        anchor: str = "la",
     ) -> None:
-        """A line of words with its upper left corner, or its `anchor`, at (x, y); made smaller to fit into `room`."""
+        """A line of words with its upper left corner, or its `anchor`, at (x, y); made smaller to
+        fit into `room`.
+        """
         from PIL import ImageFont
 
         font = ImageFont.load_default(max(4.0, TYPE * size * self._unit))
         if room is not None and (length := font.getlength(text)) > room * self._unit:
-            font = ImageFont.load_default(max(4.0, TYPE * size * self._unit * room * self._unit / length))
+            font = ImageFont.load_default(
+                max(4.0, TYPE * size * self._unit * room * self._unit / length)
+            )
         self._draw.text((x * self._unit, y * self._unit), text, self.ink, font, anchor)
 
     def number(self, x: float, y: float, radius: float, text: str) -> None:
         """A number in a ring around (x, y)."""
         box = [(c + s * radius) * self._unit for s in (-1, 1) for c in (x, y)]
         self._draw.ellipse(box, outline=self.ink, width=max(1, round(0.5 * self._unit)))
-        self.write(x, y, text, 1.1 * radius / TYPE if len(text) < 2 else 0.9 * radius / TYPE, anchor="mm")
+        self.write(
+            x, y, text, 1.1 * radius / TYPE if len(text) < 2 else 0.9 * radius / TYPE, anchor="mm"
+        )
 
     def picture(self) -> Picture:
         """The picture with the words on it."""

@@ -1,8 +1,9 @@
-"""A how-to-draw-it sheet: pages on which a child can follow a drawing, outline first, then crayon by crayon.
+"""A how-to-draw-it sheet: pages on which a child can follow a drawing, outline first, then crayon
+by crayon.
 
-The first page shows what it will become and which crayons to take out; each further one the wax to lay now, in
-full colour, over what was drawn before, which is pale. Crayons come light to dark, each once; those that give
-little come together at the end.
+The first page shows what it will become and which crayons to take out; each further one the wax to
+lay now, in full colour, over what was drawn before, which is pale. Crayons come light to dark, each
+once; those that give little come together at the end.
 """
 
 import os
@@ -36,7 +37,8 @@ LINES = (Note.LINE, Note.OUTLINE)  # notes of strokes that belong to the outline
 PLACE_MM = 1.5  # cells of the map of which crayon lies where
 SMALLEST_MM2 = 200.0  # a patch of colour smaller than this gets no outline
 PENCIL_TIP, PENCIL_N = Tip("sharp", 1.1), 0.55
-SOLID_UM = 3.0  # film at which the wax hides about two thirds of the pale drawing below it on a page
+# film at which the wax hides about two thirds of the pale drawing below it on a page
+SOLID_UM = 3.0
 
 _NEAR = np.ones((3, 3), np.uint8)  # a cell and its neighbours
 
@@ -53,16 +55,21 @@ class Step:
     strokes: tuple[Stroke, ...]
 
 
-def save_steps(drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None) -> list[Path]:
+def save_steps(
+    drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None
+) -> list[Path]:
     """Draw the pages of a drawing into `out`: a .pdf, or numbered .png pages; returns the files.
 
-    out: name.pdf; name.png for name-01.png, name-02.png, ...; a folder, made if need be, for step-01.png, ...
-    ValueError for a drawing without strokes or a name that cannot be; OSError if the disk refuses.
+    out: name.pdf; name.png for name-01.png, name-02.png, ...; a folder, made if need be, for
+    step-01.png, ... ValueError for a drawing without strokes or a name that cannot be; OSError if
+    the disk refuses.
     """
     target = Path(out)
     suffix = target.suffix.lower()
     if suffix not in (".pdf", ".png", ""):
-        raise ValueError(f"{os.fspath(out)!r}: pages go into a .pdf, into .png files or into a folder")
+        raise ValueError(
+            f"{os.fspath(out)!r}: pages go into a .pdf, into .png files or into a folder"
+        )
     if not drawing.strokes:
         raise ValueError("the drawing has no strokes, so there is nothing to show step by step")
     if suffix:
@@ -86,8 +93,17 @@ def _save_pdf(pages: Iterator[Picture], target: Path) -> None:
 
     first, *rest = (Image.fromarray(page) for page in pages)
     with whole_file(target) as part:
-        first.save(part, "PDF", save_all=True, append_images=rest, resolution=DPI, quality=88, title=target.stem,
-                   creationDate=None, modDate=None)  # fmt: skip
+        first.save(
+            part,
+            "PDF",
+            save_all=True,
+            append_images=rest,
+            resolution=DPI,
+            quality=88,
+            title=target.stem,
+            creationDate=None,
+            modDate=None,
+        )
 
 
 def steps_of(drawing: Drawing) -> list[Step]:
@@ -95,7 +111,9 @@ def steps_of(drawing: Drawing) -> list[Step]:
     steps = []
     palette = load_palette(drawing.palette)
     if outline := outline_of(drawing, palette):
-        steps.append(Step("the outline", "Draw these lines lightly.", (outline[0].crayon,), tuple(outline)))
+        steps.append(
+            Step("the outline", "Draw these lines lightly.", (outline[0].crayon,), tuple(outline))
+        )
     layers = by_crayon(drawing, palette)
     amounts = {crayon.name: _amount(strokes) for crayon, strokes in layers}
     few = FEW * sum(amounts.values())
@@ -109,7 +127,14 @@ def steps_of(drawing: Drawing) -> list[Step]:
         steps.append(Step(last[0][0], "A few small touches.", (last[0][0],), tuple(last[0][1])))
     elif last:
         names = tuple(name for name, _ in last)
-        steps.append(Step("small touches", "A little of each.", names, tuple(s for _, part in last for s in part)))
+        steps.append(
+            Step(
+                "small touches",
+                "A little of each.",
+                names,
+                tuple(s for _, part in last for s in part),
+            )
+        )
     return steps
 
 
@@ -132,7 +157,7 @@ def _hint(strokes: Sequence[Stroke]) -> str:
     return f"Draw these lines and press {how}." if lines else f"Fill these places and press {how}."
 
 
-# ---- the outline -------------------------------------------------------------------------------------------
+# ---- the outline ---------------------------------------------------------------------------------
 
 
 def outline_of(drawing: Drawing, palette: Palette) -> list[Stroke]:
@@ -181,26 +206,46 @@ def _smoothed(ring: NDArray[np.float64]) -> NDArray[np.float64]:
     """A closed line without the stairs of its cells."""
     weights = np.exp(-0.5 * (np.arange(-4, 5) / 1.6) ** 2)
     long = np.concatenate([ring[-4:], ring, ring[:4]]) if len(ring) > 8 else ring
-    smooth = np.stack([np.convolve(long[:, axis], weights / weights.sum(), "valid") for axis in (0, 1)], 1)
+    smooth = np.stack(
+        [np.convolve(long[:, axis], weights / weights.sum(), "valid") for axis in (0, 1)], 1
+    )
     return smooth if len(smooth) == len(ring) else ring
 
 
 def _places(drawing: Drawing, palette: Palette) -> NDArray[np.int32]:
-    """Which crayon dominates where, on cells of PLACE_MM; 0 is bare paper. Small patches join their surroundings."""
-    shape = (max(2, round(drawing.height_mm / PLACE_MM)), max(2, round(drawing.width_mm / PLACE_MM)))
+    """Which crayon dominates where, on cells of PLACE_MM; 0 is bare paper.
+
+    Small patches join their surroundings.
+    """
+    shape = (
+        max(2, round(drawing.height_mm / PLACE_MM)),
+        max(2, round(drawing.width_mm / PLACE_MM)),
+    )
     laid = np.zeros((len(palette.crayons) + 1, *shape), np.float32)
     laid[0] = 0.35
     for stroke in drawing.strokes:
         if stroke.note not in LINES:
             mask = np.zeros(shape, np.uint8)
             points = np.round(stroke.path_mm / PLACE_MM * 16 - 8).astype(np.int32)
-            cv2.polylines(mask, [points], False, 1, max(1, round(stroke.tip.width_mm / PLACE_MM)), cv2.LINE_8, 4)
-            laid[palette.index(stroke.crayon) + 1] += mask * float(stroke.force_n.mean() / stroke.tip.width_mm)
+            cv2.polylines(
+                mask,
+                [points],
+                False,
+                1,
+                max(1, round(stroke.tip.width_mm / PLACE_MM)),
+                cv2.LINE_8,
+                4,
+            )
+            laid[palette.index(stroke.crayon) + 1] += mask * float(
+                stroke.force_n.mean() / stroke.tip.width_mm
+            )
     for layer in laid:
         cv2.GaussianBlur(layer, (0, 0), 2.0, dst=layer)
     places = laid.argmax(0).astype(np.int32)
     for index in np.unique(places):
-        _, parts, stats, _ = cv2.connectedComponentsWithStats((places == index).astype(np.uint8), connectivity=4)
+        _, parts, stats, _ = cv2.connectedComponentsWithStats(
+            (places == index).astype(np.uint8), connectivity=4
+        )
         small = np.flatnonzero(stats[:, cv2.CC_STAT_AREA] * PLACE_MM**2 < SMALLEST_MM2)
         for part in small[small > 0]:
             inside = (parts == part).astype(np.uint8)
@@ -210,7 +255,7 @@ def _places(drawing: Drawing, palette: Palette) -> NDArray[np.int32]:
     return places
 
 
-# ---- the pages ---------------------------------------------------------------------------------------------
+# ---- the pages -----------------------------------------------------------------------------------
 
 
 def _pages(drawing: Drawing, progress: Progress | None) -> Iterator[Picture]:
@@ -218,7 +263,11 @@ def _pages(drawing: Drawing, progress: Progress | None) -> Iterator[Picture]:
     steps = steps_of(drawing)
     layout = _Layout(drawing)
     done = pipeline.draw(drawing, layout.size)
-    yield layout.first(drawing, encode_srgb(done.picture()), legend.used_crayons(done.box.palette, done.box.given_mm3))
+    yield layout.first(
+        drawing,
+        encode_srgb(done.picture()),
+        legend.used_crayons(done.box.palette, done.box.given_mm3),
+    )
     paper = np.array(done.ground, np.float32)
     under = np.broadcast_to(paper, done.picture().shape)
     for number, step in enumerate(steps, 1):
@@ -228,12 +277,16 @@ def _pages(drawing: Drawing, progress: Progress | None) -> Iterator[Picture]:
         fresh.draw(step.strokes)
         wax, cover = fresh.picture(), 1 - np.exp(-fresh.sheet.film_um() / SOLID_UM)[..., None]
         pale = paper + PALE * (under - paper)
-        yield layout.page(drawing, step, number, len(steps), encode_srgb(pale + cover * (wax - pale)))
+        yield layout.page(
+            drawing, step, number, len(steps), encode_srgb(pale + cover * (wax - pale))
+        )
         under = under + cover * (wax - under)
 
 
 class _Layout:
-    """Where things are on an A4 page that lies or stands as the drawing does; mm unless it says pixels."""
+    """Where things are on an A4 page that lies or stands as the drawing does; mm unless it says
+    pixels.
+    """
 
     def __init__(self, drawing: Drawing) -> None:
         self.lying = drawing.width_mm > drawing.height_mm
@@ -248,7 +301,9 @@ class _Layout:
         """The page that says what to take and what it will be."""
         lettering = Lettering(self._blank(), self.pixels_mm)
         lettering.write(MARGIN_MM, MARGIN_MM - 2, "You need", 2.0)
-        lettering.write(MARGIN_MM, MARGIN_MM + 7, "a sheet of drawing paper, and these crayons:", 1.1)
+        lettering.write(
+            MARGIN_MM, MARGIN_MM + 7, "a sheet of drawing paper, and these crayons:", 1.1
+        )
         page = lettering.picture()
         wide = page.shape[1] - 2 * self._px(MARGIN_MM)
         across = max(1, int((wide / self.pixels_mm - 2 * legend.MARGIN) // legend.ENTRY[0]))
@@ -260,21 +315,36 @@ class _Layout:
         shrink = min(1.0, room[0] / picture.shape[1], room[1] / picture.shape[0])
         size = (max(1, int(picture.shape[1] * shrink)), max(1, int(picture.shape[0] * shrink)))
         small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-        self._paste(page, np.asarray(small, np.uint8), (page.shape[1] - size[0]) // 2, top + high + self._px(4))
+        self._paste(
+            page,
+            np.asarray(small, np.uint8),
+            (page.shape[1] - size[0]) // 2,
+            top + high + self._px(4),
+        )
         return page
 
-    def page(self, drawing: Drawing, step: Step, number: int, steps: int, picture: Picture) -> Picture:
+    def page(
+        self, drawing: Drawing, step: Step, number: int, steps: int, picture: Picture
+    ) -> Picture:
         """The page of one step."""
         blank = self._blank()
         lettering = Lettering(blank, self.pixels_mm)
         lettering.number(MARGIN_MM + 8, MARGIN_MM + 3, 8, str(number))
         room = self.page_mm[0] - 2 * MARGIN_MM - 20
         patches = 26.0 * len(step.crayons)
-        lettering.write(MARGIN_MM + 20, MARGIN_MM - 5, step.title, 2.0, room - min(patches, room / 2))
-        words = ", ".join(step.crayons) + ". " if len(step.crayons) > 1 or step.title not in step.crayons else ""
+        lettering.write(
+            MARGIN_MM + 20, MARGIN_MM - 5, step.title, 2.0, room - min(patches, room / 2)
+        )
+        words = (
+            ", ".join(step.crayons) + ". "
+            if len(step.crayons) > 1 or step.title not in step.crayons
+            else ""
+        )
         words = f"{words[:1].upper()}{words[1:]}{step.hint}"
         lettering.write(MARGIN_MM + 20, MARGIN_MM + 4.5, words, 1.1, room - patches)
-        lettering.write(self.page_mm[0] / 2, self.page_mm[1] - FOOT_MM, f"{number} of {steps}", 0.9, anchor="mm")
+        lettering.write(
+            self.page_mm[0] / 2, self.page_mm[1] - FOOT_MM, f"{number} of {steps}", 0.9, anchor="mm"
+        )
         page = lettering.picture()
         for place, crayon in enumerate(step.crayons[7::-1]):
             left = self._px(self.page_mm[0] - MARGIN_MM - 25 * (place + 1))

@@ -1,4 +1,6 @@
-"""The elements of an SVG file by strangers: read within limits, without entities and without fetching anything."""
+"""The elements of an SVG file by strangers: read within limits, without entities and without
+fetching anything.
+"""
 
 import os
 from dataclasses import dataclass, field
@@ -13,7 +15,8 @@ MAX_ATTRIBUTE = 10_000  # characters; of geometry as many as the file has
 MAX_STYLE = 200_000
 
 _GEOMETRY = ("d", "points", "data-force")
-_FETCHED = ("use", "image", "feImage", "script", "link")  # elements whose href would have to be fetched
+# elements whose href would have to be fetched
+_FETCHED = ("use", "image", "feImage", "script", "link")
 
 
 @dataclass
@@ -59,7 +62,9 @@ class _Reader:
             self.parser.Parse(data, True)
         except expat.ExpatError as error:
             what = expat.ErrorString(error.code)
-            raise ValueError(f"line {error.lineno}, column {error.offset + 1}: not XML ({what})") from error
+            raise ValueError(
+                f"line {error.lineno}, column {error.offset + 1}: not XML ({what})"
+            ) from error
         if self.root is None or self.root.tag != "svg":
             raise ValueError("not SVG: its outermost element is not <svg>")
         return self.root
@@ -67,7 +72,9 @@ class _Reader:
     def _wrong(self, what: str) -> ValueError:
         return ValueError(f"line {self.parser.CurrentLineNumber}: {what}")
 
-    def _doctype(self, _name: str, _system: str | None, _public: str | None, has_internal_subset: int) -> None:
+    def _doctype(
+        self, _name: str, _system: str | None, _public: str | None, has_internal_subset: int
+    ) -> None:
         if has_internal_subset:
             raise self._wrong("declarations inside <!DOCTYPE> are not read; delete them")
 
@@ -84,7 +91,9 @@ class _Reader:
             raise self._wrong(f"more than {MAX_ELEMENTS:,} elements")
         if len(self.stack) >= MAX_DEPTH:
             raise self._wrong(f"nested deeper than {MAX_DEPTH} elements")
-        element = Element(name.rpartition(" ")[2], {key.rpartition(" ")[2]: value for key, value in given.items()})
+        element = Element(
+            name.rpartition(" ")[2], {key.rpartition(" ")[2]: value for key, value in given.items()}
+        )
         self._check(element)
         if self.stack:
             self.stack[-1].children.append(element)
@@ -94,15 +103,29 @@ class _Reader:
 
     def _check(self, element: Element) -> None:
         for key, value in element.attributes.items():
-            if key == "href" and element.tag in _FETCHED and not value.strip().startswith(("#", "data:")):
-                raise self._wrong(f"<{element.tag}> refers to something outside; nothing outside the file is read")
-            if len(value) > MAX_ATTRIBUTE and key not in _GEOMETRY and not value.startswith("data:"):
-                raise self._wrong(f"the attribute {key[:40]!r} is longer than {MAX_ATTRIBUTE:,} characters")
+            if (
+                key == "href"
+                and element.tag in _FETCHED
+                and not value.strip().startswith(("#", "data:"))
+            ):
+                raise self._wrong(
+                    f"<{element.tag}> refers to something outside; nothing outside the file is read"
+                )
+            if (
+                len(value) > MAX_ATTRIBUTE
+                and key not in _GEOMETRY
+                and not value.startswith("data:")
+            ):
+                raise self._wrong(
+                    f"the attribute {key[:40]!r} is longer than {MAX_ATTRIBUTE:,} characters"
+                )
 
     def _end(self, _: str) -> None:
         element = self.stack.pop()
         if element.tag == "style" and "@import" in element.text:
-            raise self._wrong("the style refers to something outside; nothing outside the file is read")
+            raise self._wrong(
+                "the style refers to something outside; nothing outside the file is read"
+            )
 
     def _text(self, text: str) -> None:
         if self.stack and self.stack[-1].tag == "style":
@@ -112,7 +135,9 @@ class _Reader:
 
 
 def style_rules(root: Element) -> dict[str, dict[str, str]]:
-    """What <style> says of a tag, a .class, an #id or a tag.class; other selectors are not understood."""
+    """What <style> says of a tag, a .class, an #id or a tag.class; other selectors are not
+    understood.
+    """
     rules: dict[str, dict[str, str]] = {}
     waiting = [root]
     while waiting:
@@ -135,4 +160,8 @@ def _without_comments(text: str) -> str:
 def declarations(text: str) -> dict[str, str]:
     """`fill: red; stroke: none` as a dict."""
     pairs = (part.partition(":") for part in text.split(";"))
-    return {key.strip(): value.replace("!important", "").strip() for key, _, value in pairs if value.strip()}
+    return {
+        key.strip(): value.replace("!important", "").strip()
+        for key, _, value in pairs
+        if value.strip()
+    }

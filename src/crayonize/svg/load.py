@@ -1,9 +1,9 @@
 """Lines other people drew, as a crayon drawing: an SVG file becomes strokes.
 
-Colours become the nearest crayon of the box. A line's width becomes the crayon's tip, within what crayons can
-draw (or the force it is pressed with); its opacity lightens the hand. A filled shape is hatched, its edge drawn
-first; one as thin as a line is drawn as a line. What a later shape covers is left out, so that colours that lie
-under each other in the file do not mix on the paper.
+Colours become the nearest crayon of the box. A line's width becomes the crayon's tip, within what
+crayons can draw (or the force it is pressed with); its opacity lightens the hand. A filled shape is
+hatched, its edge drawn first; one as thin as a line is drawn as a line. What a later shape covers
+is left out, so that colours that lie under each other in the file do not mix on the paper.
 """
 
 import os
@@ -38,7 +38,8 @@ SAME = 0.04  # OKLab distance up to which a fill counts as bare paper
 GRID_MM = 0.25  # of the map of what covers what
 STEP_MM = 0.5  # between points where visibility is asked
 MOST_FILLED = 20  # times the sheet's area
-MOST_CROSSED = 200  # times a row crosses the edge of a shape, in the mean; what is shredded finer is not filled
+# times a row crosses the edge of a shape, in the mean; what is shredded finer is not filled
+MOST_CROSSED = 200
 MAX_POINTS = 2_000_000
 MAX_LENGTH_MM = 3_000_000.0  # of all lines
 MARGIN_MM = 10.0  # around the sheet, where a crayon may still reach in
@@ -59,8 +60,8 @@ def load_svg(
 ) -> Drawing:
     """Read an SVG file as a drawing.
 
-    sheet_mm: long side of the sheet if the file gives its size in pixels or not at all. widths: what a line's
-    width becomes, "tip" or "force". say: gets one line about what was left out.
+    sheet_mm: long side of the sheet if the file gives its size in pixels or not at all. widths:
+    what a line's width becomes, "tip" or "force". say: gets one line about what was left out.
     ValueError, one line with the name of the file, for anything that cannot be drawn.
     """
     name = repr(os.fspath(path))
@@ -72,7 +73,9 @@ def load_svg(
         left_out = ", ".join(f"{n} <{tag}>" for tag, n in page.left_out.items())
         strokes = list(_strokes(page, _Chooser(box, load_paper(paper).colour), widths))
         if not strokes:
-            raise ValueError("no line or shape lies on the sheet" + (f" (only {left_out})" if left_out else ""))
+            raise ValueError(
+                "no line or shape lies on the sheet" + (f" (only {left_out})" if left_out else "")
+            )
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
     if say and left_out:
@@ -103,7 +106,7 @@ def _lab_of(colour: RGB) -> NDArray[np.float32]:
     return oklab(decode_srgb(np.array(colour, np.float32).reshape(1, 1, 3))[0, 0])
 
 
-# ---- from shapes to strokes --------------------------------------------------------------------------------
+# ---- from shapes to strokes ----------------------------------------------------------------------
 
 
 def _strokes(page: Page, chooser: _Chooser, widths: str) -> Iterator[Stroke]:
@@ -141,7 +144,9 @@ def _named(shape: Shape, colour: RGB, chooser: _Chooser) -> str:
     return named if named in chooser.names else chooser.crayon(colour)
 
 
-def _drawn(shape: Shape, crayon: str, visible: "_Visible", widths: str, usual_mm: float) -> Iterator[Stroke]:
+def _drawn(
+    shape: Shape, crayon: str, visible: "_Visible", widths: str, usual_mm: float
+) -> Iterator[Stroke]:
     """The lines of a shape."""
     own = _own_forces(shape)
     if widths == "force":
@@ -158,7 +163,9 @@ def _drawn(shape: Shape, crayon: str, visible: "_Visible", widths: str, usual_mm
             for path, forces in visible.parts(line, own):
                 yield _stroke(path, forces, crayon, tip, shape.data.get("data-note", "line"))
         else:
-            for path, forces in visible.parts(line, np.full(len(line), own[0] if own is not None else force)):
+            for path, forces in visible.parts(
+                line, np.full(len(line), own[0] if own is not None else force)
+            ):
                 yield _stroke(path, forces, crayon, tip, shape.data.get("data-note", "line"))
 
 
@@ -175,7 +182,9 @@ def _filled(shape: Shape, number: int, crayon: str, visible: "_Visible") -> Iter
         edge = tip if thin else Tip("sharp", max(FILL_TIP_MM[0], width / 2))
         for ring in edges:
             ring = np.concatenate([ring, ring[:1]])
-            for path, forces in visible.parts(ring, np.full(len(ring), force * (edge.width_mm / width) ** 2)):
+            for path, forces in visible.parts(
+                ring, np.full(len(ring), force * (edge.width_mm / width) ** 2)
+            ):
                 yield _stroke(path, forces, crayon, edge, "line")
     if not thin:
         rng = np.random.default_rng(number)
@@ -205,7 +214,13 @@ def _force(tip: Tip) -> float:
 
 def _kind(shape: Shape, width: float) -> str:
     named = shape.data.get("data-tip", "")
-    return named if named in ("sharp", "blunt", "rim", "side") else "sharp" if width < SHARP_MM else "blunt"
+    return (
+        named
+        if named in ("sharp", "blunt", "rim", "side")
+        else "sharp"
+        if width < SHARP_MM
+        else "blunt"
+    )
 
 
 def _angle(shape: Shape) -> float:
@@ -225,39 +240,59 @@ def _own_forces(shape: Shape) -> Floats | None:
 
 
 def _thickness(rings: list[Floats]) -> float:
-    """Of a plane inside rings: twice the area over the length of its edge; the width, if it is a strip."""
+    """Of a plane inside rings: twice the area over the length of its edge; the width, if it is a
+    strip.
+    """
     if not rings:
         return 0.0
     low, high = np.min([r.min(0) for r in rings], 0), np.max([r.max(0) for r in rings], 0)
     pixel = max(float((high - low).max()) / 400, 1e-6)
     picture = np.zeros(np.ceil((high - low) / pixel).astype(int)[::-1] + 1, np.uint8)
-    cv2.fillPoly(picture, [np.round((r - low) / pixel * 16).astype(np.int32) for r in rings], 1, cv2.LINE_8, 4)
+    cv2.fillPoly(
+        picture,
+        [np.round((r - low) / pixel * 16).astype(np.int32) for r in rings],
+        1,
+        cv2.LINE_8,
+        4,
+    )
     around = sum(float(np.hypot(*(np.roll(r, -1, 0) - r).T).sum()) for r in rings)
     return 2 * int(picture.sum()) * pixel**2 / max(around, 1e-9)
 
 
-# ---- what is seen ------------------------------------------------------------------------------------------
+# ---- what is seen --------------------------------------------------------------------------------
 
 
 def _cover(page: Page) -> NDArray[np.int32]:
     """The number (from 1) of the last opaque shape that covers each place of a grid of GRID_MM."""
-    cover = np.zeros((int(page.height_mm / GRID_MM) + 2, int(page.width_mm / GRID_MM) + 2), np.int32)
+    cover = np.zeros(
+        (int(page.height_mm / GRID_MM) + 2, int(page.width_mm / GRID_MM) + 2), np.int32
+    )
     for number, shape in enumerate(page.shapes, 1):
         if shape.fill is not None and shape.fill_opacity > 0.9:
             rings = _planes(shape.lines, np.array([page.width_mm, page.height_mm]))
-            cv2.fillPoly(cover, [np.round(r / GRID_MM * 16).astype(np.int32) for r in rings], number, cv2.LINE_8, 4)
+            cv2.fillPoly(
+                cover,
+                [np.round(r / GRID_MM * 16).astype(np.int32) for r in rings],
+                number,
+                cv2.LINE_8,
+                4,
+            )
     return cover
 
 
 def _planes(lines: list[Floats], sheet: Floats) -> list[Floats]:
-    """The rings of a filled shape, cut off a little outside the sheet; none if they are shredded too finely."""
+    """The rings of a filled shape, cut off a little outside the sheet; none if they are shredded
+    too finely.
+    """
     rings = [_cut(line, sheet) for line in lines if len(line) > 2]
     rings = [ring for ring in rings if len(ring) > 2]
     if not rings:
         return []
     for axis in (0, 1):
         travel = sum(float(np.abs(np.diff(r[:, axis], append=r[0, axis])).sum()) for r in rings)
-        extent = max(float(r[:, axis].max()) for r in rings) - min(float(r[:, axis].min()) for r in rings)
+        extent = max(float(r[:, axis].max()) for r in rings) - min(
+            float(r[:, axis].min()) for r in rings
+        )
         if travel > MOST_CROSSED * max(extent, 1e-6):
             return []
     return rings
@@ -265,7 +300,12 @@ def _planes(lines: list[Floats], sheet: Floats) -> list[Floats]:
 
 def _cut(ring: Floats, sheet: Floats) -> Floats:
     """A ring cut by four half-planes 1 mm outside the sheet (Sutherland and Hodgman 1974)."""
-    for axis, bound, side in ((0, -1.0, 1), (1, -1.0, 1), (0, sheet[0] + 1, -1), (1, sheet[1] + 1, -1)):
+    for axis, bound, side in (
+        (0, -1.0, 1),
+        (1, -1.0, 1),
+        (0, sheet[0] + 1, -1),
+        (1, sheet[1] + 1, -1),
+    ):
         over = side * (ring[:, axis] - bound)
         if (over >= 0).all():
             continue
@@ -280,7 +320,9 @@ def _cut(ring: Floats, sheet: Floats) -> Floats:
 
 
 class _Visible:
-    """Which parts of a line of shape `number` lie on the sheet or near, and under no later shape."""
+    """Which parts of a line of shape `number` lie on the sheet or near, and under no later
+    shape.
+    """
 
     def __init__(self, cover: NDArray[np.int32], sheet: Floats) -> None:
         self.cover, self.sheet, self.number, self.length_mm = cover, sheet, 0, 0.0
@@ -295,7 +337,9 @@ class _Visible:
         for piece in self._on_sheet(np.column_stack([line, force])):
             self.length_mm += float(np.hypot(*np.diff(piece[:, :2], axis=0).T).sum())
             if self.length_mm > MAX_LENGTH_MM:
-                raise ValueError(f"lines and hatchings are longer than {MAX_LENGTH_MM / 1e6:g} km in all")
+                raise ValueError(
+                    f"lines and hatchings are longer than {MAX_LENGTH_MM / 1e6:g} km in all"
+                )
             fine = _resampled(piece)
             seen = self._seen(fine[:, :2])
             if seen.all():
@@ -308,17 +352,23 @@ class _Visible:
 
     def _seen(self, points: Floats) -> NDArray[np.bool_]:
         inside = ((points >= self.low) & (points <= self.high)).all(1)
-        cell = np.clip(np.nan_to_num(points) / GRID_MM, 0, np.array(self.cover.shape)[::-1] - 1).astype(int)
+        cell = np.clip(
+            np.nan_to_num(points) / GRID_MM, 0, np.array(self.cover.shape)[::-1] - 1
+        ).astype(int)
         return np.asarray(inside & (self.cover[cell[:, 1], cell[:, 0]] <= self.number))
 
     def _on_sheet(self, line: Floats) -> Iterator[Floats]:
-        """Pieces of a line (n, 3) inside the sheet: each step is cut by the four edges (Liang and Barsky 1984)."""
+        """Pieces of a line (n, 3) inside the sheet: each step is cut by the four edges (Liang and
+        Barsky 1984).
+        """
         if ((line[:, :2] >= self.low) & (line[:, :2] <= self.high)).all():
             yield line
             return
         start, step = line[:-1], np.diff(line, axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = np.stack([(self.low - start[:, :2]) / step[:, :2], (self.high - start[:, :2]) / step[:, :2]])
+            t = np.stack(
+                [(self.low - start[:, :2]) / step[:, :2], (self.high - start[:, :2]) / step[:, :2]]
+            )
         flat = step[:, :2] == 0
         within = (start[:, :2] >= self.low) & (start[:, :2] <= self.high)
         enter = np.where(flat, np.where(within, 0, 2), t.min(0)).max(1).clip(0)
@@ -339,17 +389,22 @@ def _resampled(line: Floats) -> Floats:
     steps = np.hypot(*np.diff(line[:, :2], axis=0).T)
     parts = np.maximum(np.ceil(steps / STEP_MM).astype(int), 1)
     index = np.repeat(np.arange(len(parts)), parts)
-    t = (np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)) / np.repeat(parts, parts)
+    t = (np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)) / np.repeat(
+        parts, parts
+    )
     return np.concatenate([line[index] + t[:, None] * (line[index + 1] - line[index]), line[-1:]])
 
 
-# ---- hatching ----------------------------------------------------------------------------------------------
+# ---- hatching ------------------------------------------------------------------------------------
 
 
-def _hatching(rings: list[Floats], gap: float, turn: float, inset: float, even_odd: bool) -> Iterator[Floats]:
+def _hatching(
+    rings: list[Floats], gap: float, turn: float, inset: float, even_odd: bool
+) -> Iterator[Floats]:
     """Zigzags that fill the plane inside rings, lines `gap` apart at an angle of `turn`.
 
-    Each row is cut by the rings; a part of a row goes on with the line that ended nearby in the row before.
+    Each row is cut by the rings; a part of a row goes on with the line that ended nearby in the row
+    before.
     """
     axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     a = np.concatenate(rings) @ axes.T
@@ -358,7 +413,9 @@ def _hatching(rings: list[Floats], gap: float, turn: float, inset: float, even_o
     for y in np.arange(a[:, 1].min() + gap / 2, a[:, 1].max(), gap):
         still: list[list[tuple[float, float]]] = []
         for ends in _crossed(a, b, float(y), inset, even_odd):
-            line = next((o for o in open_lines if min(abs(o[-1][0] - x) for x in ends) < 2 * gap), None)
+            line = next(
+                (o for o in open_lines if min(abs(o[-1][0] - x) for x in ends) < 2 * gap), None
+            )
             if line is not None:
                 open_lines.remove(line)
             line = line or []
@@ -370,7 +427,9 @@ def _hatching(rings: list[Floats], gap: float, turn: float, inset: float, even_o
     yield from (np.array(line) @ axes for line in open_lines)
 
 
-def _crossed(a: Floats, b: Floats, y: float, inset: float, even_odd: bool) -> list[tuple[float, float]]:
+def _crossed(
+    a: Floats, b: Floats, y: float, inset: float, even_odd: bool
+) -> list[tuple[float, float]]:
     """Where the row at `y` lies inside the rings whose sides go from `a` to `b`."""
     up, down = (a[:, 1] <= y) & (b[:, 1] > y), (b[:, 1] <= y) & (a[:, 1] > y)
     cut = np.flatnonzero(up | down)

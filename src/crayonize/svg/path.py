@@ -1,4 +1,6 @@
-"""Path data of SVG as polylines: the path grammar, arcs and Bezier curves, within the limits of a stranger's file."""
+"""Path data of SVG as polylines: the path grammar, arcs and Bezier curves, within the limits of a
+stranger's file.
+"""
 
 import math
 import re
@@ -23,8 +25,9 @@ _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7
 
 
 class Outline:
-    """One subpath. ends (n, 2): where each segment ends, the first being the start; for segment i the cubic's
-    two inner control points are inner[i] (n, 2, 2), NaN where the segment is straight."""
+    """One subpath. ends (n, 2): where each segment ends, the first being the start; for segment i
+    the cubic's two inner control points are inner[i] (n, 2, 2), NaN where the segment is
+    straight."""
 
     def __init__(self, start: tuple[float, float]) -> None:
         self.ends: Points = [start]
@@ -53,11 +56,15 @@ class Outline:
 
 
 def _curves(ends: Floats, inner: Floats) -> Floats:
-    """Points along straight and curved segments; `ends` (n, 2) and `inner` (n, 2, 2) as in Outline."""
+    """Points along straight and curved segments; `ends` (n, 2) and `inner` (n, 2, 2) as in
+    Outline.
+    """
     control = np.stack([np.roll(ends, 1, 0), inner[:, 0], inner[:, 1], ends], 1)
     length = np.hypot(*np.diff(control, axis=1).transpose(2, 0, 1)).sum(1)
     curved = ~np.isnan(inner[:, 0, 0])
-    number = np.where(curved, np.clip(np.nan_to_num(length / STEP_MM, posinf=4), 4, MOST_POINTS), 1).astype(int)
+    number = np.where(
+        curved, np.clip(np.nan_to_num(length / STEP_MM, posinf=4), 4, MOST_POINTS), 1
+    ).astype(int)
     if number.sum() > MAX_POINTS:
         raise ValueError(f"a curve of more than {MAX_POINTS:,} points")
     which = np.repeat(np.arange(len(ends)), number)
@@ -106,8 +113,14 @@ def outlines(data: str) -> list[Outline]:
             near = (2 * x - bend[0], 2 * y - bend[1]) if before in tuple("QT") else (x, y)
             bend = (values[0], values[1]) if command == "Q" else near
             ex, ey = values[-2:]
-            now.cubic(x + (bend[0] - x) * 2 / 3, y + (bend[1] - y) * 2 / 3, ex + (bend[0] - ex) * 2 / 3,
-                      ey + (bend[1] - ey) * 2 / 3, ex, ey)  # fmt: skip
+            now.cubic(
+                x + (bend[0] - x) * 2 / 3,
+                y + (bend[1] - y) * 2 / 3,
+                ex + (bend[0] - ex) * 2 / 3,
+                ey + (bend[1] - ey) * 2 / 3,
+                ex,
+                ey,
+            )
         elif command == "A":
             _arc(now, x, y, *values)
         x, y = values[-2:]
@@ -148,7 +161,9 @@ def _leading(text: str) -> list[float]:
 
 
 def _arc_numbers(text: str) -> tuple[list[float], bool]:
-    """As `_numbers`; the two flags of an arc may stand without anything between them and the next number."""
+    """As `_numbers`; the two flags of an arc may stand without anything between them and the next
+    number.
+    """
     numbers: list[float] = []
     at = _skip(text, 0)
     while at < len(text):
@@ -174,11 +189,27 @@ def _absolute(command: str, values: tuple[float, ...], x: float, y: float) -> tu
     return tuple(value + (y if i % 2 else x) for i, value in enumerate(values))
 
 
-def _arc(path: Outline, x0: float, y0: float, rx: float, ry: float, turn: float, large: float, sweep: float,
-         x1: float, y1: float) -> None:  # fmt: skip
-    """An elliptic arc as cubics of at most a quarter turn (SVG 1.1, F.6.5; Bezier arms 4/3 tan(angle/4))."""
+def _arc(
+    path: Outline,
+    x0: float,
+    y0: float,
+    rx: float,
+    ry: float,
+    turn: float,
+    large: float,
+    sweep: float,
+    x1: float,
+    y1: float,
+) -> None:
+    """An elliptic arc as cubics of at most a quarter turn (SVG 1.1, F.6.5; Bezier arms 4/3
+    tan(angle/4)).
+    """
     rx, ry = abs(rx), abs(ry)
-    if not all(map(math.isfinite, (x0, y0, rx, ry, turn, x1, y1))) or min(rx, ry) < 1e-9 or (x0, y0) == (x1, y1):
+    if (
+        not all(map(math.isfinite, (x0, y0, rx, ry, turn, x1, y1)))
+        or min(rx, ry) < 1e-9
+        or (x0, y0) == (x1, y1)
+    ):
         path.line(x1, y1)
         return
     cos, sin = math.cos(math.radians(turn)), math.sin(math.radians(turn))
@@ -190,7 +221,12 @@ def _arc(path: Outline, x0: float, y0: float, rx: float, ry: float, turn: float,
         path.line(x1, y1)
         return
     grow = max(1.0, half)
-    away = math.sqrt(max(0.0, 1 - (half / grow) ** 2)) * grow / (2 * half) * (1 if bool(large) != bool(sweep) else -1)
+    away = (
+        math.sqrt(max(0.0, 1 - (half / grow) ** 2))
+        * grow
+        / (2 * half)
+        * (1 if bool(large) != bool(sweep) else -1)
+    )
     cx, cy = (ax + bx) / 2 - away * (by - ay), (ay + by) / 2 + away * (bx - ax)
     start = math.atan2(ay - cy, ax - cx)
     angle = (math.atan2(by - cy, bx - cx) - start) % (2 * math.pi)

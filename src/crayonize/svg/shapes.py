@@ -1,8 +1,10 @@
-"""What an SVG file draws: its shapes as polylines on the sheet, each with the colours and widths it ends up with.
+"""What an SVG file draws: its shapes as polylines on the sheet, each with the colours and widths it
+ends up with.
 
-Understood: path, line, polyline, polygon, rect, circle, ellipse; g, a, switch, use, symbol and nested svg;
-transforms, viewBox, units, presentation attributes, simple style sheets, opacity, gradients (as their mean
-colour). Left out: text, pictures, filters, masks, clipping, patterns, markers, dashes.
+Understood: path, line, polyline, polygon, rect, circle, ellipse; g, a, switch, use, symbol and
+nested svg; transforms, viewBox, units, presentation attributes, simple style sheets, opacity,
+gradients (as their mean colour). Left out: text, pictures, filters, masks, clipping, patterns,
+markers, dashes.
 """
 
 import math
@@ -27,14 +29,33 @@ SMALLEST_MM, LARGEST_MM = 10.0, 2000.0  # long side of a sheet whose size stands
 Floats = NDArray[np.float64]
 RGB = tuple[float, float, float]
 
-_INHERITED = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity", "fill-rule", "color", "visibility",
-              "data-crayon", "data-tip", "data-angle", "data-note")  # fmt: skip
+_INHERITED = (
+    "fill",
+    "stroke",
+    "stroke-width",
+    "fill-opacity",
+    "stroke-opacity",
+    "fill-rule",
+    "color",
+    "visibility",
+    "data-crayon",
+    "data-tip",
+    "data-angle",
+    "data-note",
+)
 _GROUPS = ("g", "a", "switch", "svg", "symbol", "use")
 _SHAPES = ("path", "line", "polyline", "polygon", "rect", "circle", "ellipse")
 _SIDES = ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "x1", "y1", "x2", "y2")
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s?([a-zA-Z%]*)")
 _CALL = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
-_TAKES = {"matrix": (6,), "translate": (1, 2), "scale": (1, 2), "rotate": (1, 3), "skewX": (1,), "skewY": (1,)}
+_TAKES = {
+    "matrix": (6,),
+    "translate": (1, 2),
+    "scale": (1, 2),
+    "rotate": (1, 3),
+    "skewX": (1,),
+    "skewY": (1,),
+}
 _RGB = re.compile(r"rgba?\(\s*([0-9.]+%?(?:[\s,/]+[0-9.]+%?){2,3})\s*\)")
 _PART = re.compile(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)(%?)")
 
@@ -56,7 +77,10 @@ class Shape:
 
 @dataclass
 class Page:
-    """A sheet and the shapes on it, first to last. left_out: how many elements were not understood, by tag."""
+    """A sheet and the shapes on it, first to last.
+
+    left_out: how many elements were not understood, by tag.
+    """
 
     width_mm: float
     height_mm: float
@@ -65,16 +89,21 @@ class Page:
 
 
 def page(root: Element, long_mm: float) -> Page:
-    """The shapes of an SVG file. long_mm: long side of the sheet if the file does not say how large it is.
+    """The shapes of an SVG file. long_mm: long side of the sheet if the file does not say how large
+    it is.
 
     ValueError, without the name of the file before it, for what cannot be drawn.
     """
     fitted = _fit(root, long_mm)
     if fitted is None:  # no size and no viewBox: what is drawn fills the sheet
         loose = _Walk(root, np.eye(3)).shapes
-        points = np.concatenate([line for shape in loose for line in shape.lines] or [np.zeros((1, 2))])
+        points = np.concatenate(
+            [line for shape in loose for line in shape.lines] or [np.zeros((1, 2))]
+        )
         low, high = points.min(0), points.max(0)
-        root.attributes["viewBox"] = " ".join(map(repr, [*low.tolist(), *np.maximum(high - low, 1e-3).tolist()]))
+        root.attributes["viewBox"] = " ".join(
+            map(repr, [*low.tolist(), *np.maximum(high - low, 1e-3).tolist()])
+        )
         fitted = _fit(root, long_mm)
         assert fitted
     width, height, matrix = fitted
@@ -82,11 +111,13 @@ def page(root: Element, long_mm: float) -> Page:
     return Page(width, height, walk.shapes, walk.left_out)
 
 
-# ---- the sheet ---------------------------------------------------------------------------------------------
+# ---- the sheet -----------------------------------------------------------------------------------
 
 
 def _fit(root: Element, long_mm: float) -> tuple[float, float, Floats] | None:
-    """Width and height in mm, and the matrix from user units to mm; None if the file gives no size at all."""
+    """Width and height in mm, and the matrix from user units to mm; None if the file gives no size
+    at all.
+    """
     box = _view_box(root.attributes.get("viewBox"))
     across, down = _size(root, "width"), _size(root, "height")
     if box is None:
@@ -105,7 +136,11 @@ def _fit(root: Element, long_mm: float) -> tuple[float, float, Floats] | None:
         width, height = (long_mm * side / max(box[2:]) for side in box[2:])
         if min(width, height) < 1:
             raise ValueError(f"the sheet is {box[2]:.4g} x {box[3]:.4g}, too narrow to draw on")
-    return width, height, _view_matrix(box, 0, 0, width, height, root.attributes.get("preserveAspectRatio", ""))
+    return (
+        width,
+        height,
+        _view_matrix(box, 0, 0, width, height, root.attributes.get("preserveAspectRatio", "")),
+    )
 
 
 def _size(root: Element, name: str) -> tuple[float, bool] | None:
@@ -130,25 +165,37 @@ def _view_box(text: str | None) -> tuple[float, float, float, float] | None:
         x, y, width, height = (float(part) for part in text.replace(",", " ").split())
     except ValueError:
         raise ValueError(f"viewBox is {text[:40]!r}; it must be four numbers") from None
-    if not all(map(math.isfinite, (x, y, width, height))) or not 1e-9 < min(width, height) <= max(width, height) < 1e9:
-        raise ValueError(f"viewBox is {text[:40]!r}; its sides must be larger than 0 and of a usual size")
+    if (
+        not all(map(math.isfinite, (x, y, width, height)))
+        or not 1e-9 < min(width, height) <= max(width, height) < 1e9
+    ):
+        raise ValueError(
+            f"viewBox is {text[:40]!r}; its sides must be larger than 0 and of a usual size"
+        )
     return x, y, width, height
 
 
 def _view_matrix(
-    box: tuple[float, float, float, float], x: float, y: float, width: float, height: float, aspect: str
+    box: tuple[float, float, float, float],
+    x: float,
+    y: float,
+    width: float,
+    height: float,
+    aspect: str,
 ) -> Floats:
     """From the units of a viewBox into a rectangle; as a rule as large as fits, in the middle."""
     sx, sy = width / box[2], height / box[3]
     if not aspect.strip().startswith("none"):
         sx = sy = max(sx, sy) if "slice" in aspect else min(sx, sy)
-    shift = [0.0 if f"{axis}Min" in aspect else 1.0 if f"{axis}Max" in aspect else 0.5 for axis in "xY"]
+    shift = [
+        0.0 if f"{axis}Min" in aspect else 1.0 if f"{axis}Max" in aspect else 0.5 for axis in "xY"
+    ]
     tx = x + shift[0] * (width - sx * box[2]) - sx * box[0]
     ty = y + shift[1] * (height - sy * box[3]) - sy * box[1]
     return np.array([[sx, 0, tx], [0, sy, ty], [0, 0, 1]], np.float64)
 
 
-# ---- the elements ------------------------------------------------------------------------------------------
+# ---- the elements --------------------------------------------------------------------------------
 
 
 class _Walk:
@@ -162,7 +209,9 @@ class _Walk:
         self.used = self.points = self.lines = 0
         self._outlines: dict[int, list[Outline]] = {}
         self._name(root)
-        style = self._style(root, {"fill": "black", "stroke": "none", "stroke-width": "1", "color": "black"})
+        style = self._style(
+            root, {"fill": "black", "stroke": "none", "stroke-width": "1", "color": "black"}
+        )
         self.unit_mm = _scale(matrix)
         for child in root.children:
             self._visit(child, matrix, style, _opacity(style), 1)
@@ -175,18 +224,26 @@ class _Walk:
             if "id" in element.attributes:
                 self.ids[element.attributes["id"]] = element
 
-    def _visit(self, element: Element, matrix: Floats, above: Mapping[str, str], opacity: float, depth: int) -> None:
+    def _visit(
+        self, element: Element, matrix: Floats, above: Mapping[str, str], opacity: float, depth: int
+    ) -> None:
         if depth > MAX_DEPTH:
-            raise ValueError(f"nested deeper than {MAX_DEPTH} elements, or a <use> that leads back to itself")
+            raise ValueError(
+                f"nested deeper than {MAX_DEPTH} elements, or a <use> that leads back to itself"
+            )
         if element.tag in ("text", "image", "foreignObject"):
             self.left_out[element.tag] = self.left_out.get(element.tag, 0) + 1
-        if element.tag not in _GROUPS + _SHAPES or (element.tag == "symbol" and above.get("through") != "use"):
+        if element.tag not in _GROUPS + _SHAPES or (
+            element.tag == "symbol" and above.get("through") != "use"
+        ):
             return
         style = self._style(element, above)
         opacity *= _opacity(style)
         if style.get("display") == "none" or opacity < 0.02:
             return
-        matrix = _product(matrix, transform(element.attributes.get("transform") or style.get("transform", "")))
+        matrix = _product(
+            matrix, transform(element.attributes.get("transform") or style.get("transform", ""))
+        )
         if element.tag in _SHAPES:
             if style.get("visibility") not in ("hidden", "collapse"):
                 self._add(element, matrix, style, opacity)
@@ -197,24 +254,39 @@ class _Walk:
             x, y = (_length(element.attributes.get(axis, "0")) for axis in "xy")
             target = self.ids.get(element.attributes.get("href", "")[1:])
             if target is not None:
-                self._visit(target, _product(matrix, _moved(x, y)), {**style, "through": "use"}, opacity, depth + 1)
+                self._visit(
+                    target,
+                    _product(matrix, _moved(x, y)),
+                    {**style, "through": "use"},
+                    opacity,
+                    depth + 1,
+                )
         else:
             matrix = _product(matrix, _inner(element))
             for child in element.children:
                 self._visit(child, matrix, style, opacity, depth + 1)
 
     def _style(self, element: Element, above: Mapping[str, str]) -> dict[str, str]:
-        """The properties of an element: inherited, then its attributes, the style sheet's, its own style."""
+        """The properties of an element: inherited, then its attributes, the style sheet's, its own
+        style.
+        """
         own = dict(element.attributes)
         names = element.attributes.get("class", "").split()
-        selectors = ["*", element.tag, *(f".{n}" for n in names), *(f"{element.tag}.{n}" for n in names)]
+        selectors = [
+            "*",
+            element.tag,
+            *(f".{n}" for n in names),
+            *(f"{element.tag}.{n}" for n in names),
+        ]
         for selector in (*selectors, f"#{element.attributes.get('id', '')}"):
             own.update(self.rules.get(selector, {}))
         own.update(declarations(element.attributes.get("style", "")))
         inherited = {key: above[key] for key in _INHERITED if key in above}
         return {**inherited, **{key: value for key, value in own.items() if value != "inherit"}}
 
-    def _add(self, element: Element, matrix: Floats, style: Mapping[str, str], opacity: float) -> None:
+    def _add(
+        self, element: Element, matrix: Floats, style: Mapping[str, str], opacity: float
+    ) -> None:
         stroke, fill = self._colour(style, "stroke"), self._colour(style, "fill")
         width = _length(style.get("stroke-width", "1")) * _scale(matrix)
         stroke = stroke if width > 0 else None
@@ -234,14 +306,27 @@ class _Walk:
             raise ValueError(f"more than {MAX_POINTS:,} points")
         if not all(np.isfinite(line).all() for line in lines):
             raise ValueError(f"<{element.tag}> has a coordinate beyond all bounds")
-        closed = [len(line) > 2 and bool(np.allclose(line[0], line[-1], atol=1e-6)) for line in lines]
-        stroke_opacity, fill_opacity = (opacity * _alpha(style, name) for name in ("stroke", "fill"))
+        closed = [
+            len(line) > 2 and bool(np.allclose(line[0], line[-1], atol=1e-6)) for line in lines
+        ]
+        stroke_opacity, fill_opacity = (
+            opacity * _alpha(style, name) for name in ("stroke", "fill")
+        )
         data = {key: value for key, value in style.items() if key.startswith("data-")}
         if lines:
             self.shapes.append(
-                Shape(lines, closed, stroke, width, stroke_opacity, fill if fill_opacity > 0.02 else None,
-                      fill_opacity, style.get("fill-rule") == "evenodd", data)
-            )  # fmt: skip
+                Shape(
+                    lines,
+                    closed,
+                    stroke,
+                    width,
+                    stroke_opacity,
+                    fill if fill_opacity > 0.02 else None,
+                    fill_opacity,
+                    style.get("fill-rule") == "evenodd",
+                    data,
+                )
+            )
 
     def _outline(self, element: Element) -> list[Outline]:
         """Subpaths of an element in its own units; kept, as <use> may come back."""
@@ -278,7 +363,9 @@ class _Walk:
 def _inner(element: Element) -> Floats:
     """What a nested svg or symbol does to the units of its children."""
     box = _view_box(element.attributes.get("viewBox")) if element.tag in ("svg", "symbol") else None
-    x, y = (_length(element.attributes.get(axis, "0")) if element.tag == "svg" else 0.0 for axis in "xy")
+    x, y = (
+        _length(element.attributes.get(axis, "0")) if element.tag == "svg" else 0.0 for axis in "xy"
+    )
     if box is None:
         return _moved(x, y)
     width = _length(element.attributes.get("width", ""), box[2])
@@ -331,10 +418,22 @@ def _call(name: str, *v: float) -> Floats:
     angle = math.radians(v[0])
     if name == "rotate":
         x, y = v[1:] or (0.0, 0.0)
-        turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+        turn = np.array(
+            [
+                [math.cos(angle), -math.sin(angle), 0],
+                [math.sin(angle), math.cos(angle), 0],
+                [0, 0, 1],
+            ]
+        )
         return np.asarray(_moved(x, y) @ turn @ _moved(-x, -y))
     slant = math.tan(angle)
-    return np.array([[1, slant if name == "skewX" else 0, 0], [slant if name == "skewY" else 0, 1, 0], [0, 0, 1]])
+    return np.array(
+        [
+            [1, slant if name == "skewX" else 0, 0],
+            [slant if name == "skewY" else 0, 1, 0],
+            [0, 0, 1],
+        ]
+    )
 
 
 def _length(text: str, otherwise: float = 0.0) -> float:
@@ -363,7 +462,10 @@ def _rgba(text: str) -> tuple[float, float, float, float] | None:
     text = text.strip().lower()
     if found := _RGB.fullmatch(text):
         full = (255, 255, 255, 1)
-        parts = [float(n) / (100 if unit else f) for f, (n, unit) in zip(full, _PART.findall(found[1]), strict=False)]
+        parts = [
+            float(n) / (100 if unit else f)
+            for f, (n, unit) in zip(full, _PART.findall(found[1]), strict=False)
+        ]
         r, g, b, a = (min(part, 1.0) for part in (*parts, 1.0)[:4])
         return r, g, b, a
     try:
@@ -378,7 +480,7 @@ def _rgb(text: str) -> RGB | None:
     return colour[:3] if colour and colour[3] > 0 else None
 
 
-# ---- shapes as paths ----------------------------------------------------------------------------------------------
+# ---- shapes as paths -----------------------------------------------------------------------------
 
 
 def _path_data(element: Element) -> str:
@@ -393,7 +495,14 @@ def _path_data(element: Element) -> str:
     if element.tag == "line":
         return f"M{get('x1', 0)},{get('y1', 0)}L{get('x2', 0)},{get('y2', 0)}"
     if element.tag == "rect":
-        return _rectangle(get("x", 0.0), get("y", 0.0), get("width", 0.0), get("height", 0.0), get("rx"), get("ry"))
+        return _rectangle(
+            get("x", 0.0),
+            get("y", 0.0),
+            get("width", 0.0),
+            get("height", 0.0),
+            get("rx"),
+            get("ry"),
+        )
     rx, ry = (get("r", 0.0),) * 2 if element.tag == "circle" else (get("rx", 0.0), get("ry", 0.0))
     if min(rx, ry) <= 0:
         return ""
@@ -401,7 +510,9 @@ def _path_data(element: Element) -> str:
     return f"M{x - rx},{y}A{rx},{ry} 0 0 1 {x + rx},{y}A{rx},{ry} 0 0 1 {x - rx},{y}Z"
 
 
-def _rectangle(x: float, y: float, width: float, height: float, rx: float | None, ry: float | None) -> str:
+def _rectangle(
+    x: float, y: float, width: float, height: float, rx: float | None, ry: float | None
+) -> str:
     if min(width, height) <= 0:
         return ""
     rx = min(max(rx if rx is not None else ry or 0.0, 0.0), width / 2)
