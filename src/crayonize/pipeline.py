@@ -88,15 +88,9 @@ def easel(
     cell_mm = max(drawing.width_mm, drawing.height_mm) / size
     rows, cols = max(1, round(drawing.height_mm / cell_mm)), max(1, round(drawing.width_mm / cell_mm))
     tooth = paper.tooth(sheet_paper, rows, cols, cell_mm, drawing.seed)
-    sheet = Sheet(tooth, cell_mm, *_optics(palette))
     box = Box(palette, physics(drawing.physics), cell_mm, drawing.seed)
+    sheet = Sheet(tooth, cell_mm, *box.optics())
     return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or cores.allowed(), smears)
-
-
-def _optics(palette: Palette) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """k and s of all crayons, (crayons, 3) each."""
-    k = np.array([c.k for c in palette.crayons], np.float32)
-    return k, np.array([c.s for c in palette.crayons], np.float32)
 
 
 def draw(

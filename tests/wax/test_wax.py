@@ -6,7 +6,7 @@ from dataclasses import replace
 import naive
 import numpy as np
 import pytest
-from bench_sheet import old_wax, pigments
+from bench_sheet import Bench, old_wax, pigments
 
 from crayonize.wax import columns as wax
 from crayonize.wax import contact, rub, smear, window
@@ -711,3 +711,31 @@ def test_progress_and_loss_of_no_strokes(bench):
 def test_an_unknown_physics_is_named():
     with pytest.raises(ValueError, match="physics: 'oil' is none of metric"):
         physics("oil")
+
+
+# ---- media --------------------------------------------------------------------------------------------------
+
+
+def test_media_differ_as_they_do_on_paper(crayons):
+    """Oil pastel gives most and reaches farthest, a pencil least; both show more colour in as much wax."""
+    films, drifts = {}, {}
+    for name in ("pencil", "metric", "oil-pastel"):
+        bench = Bench(physics(name), crayons)
+        sheet = bench.felt(100, 160)
+        bench.draw(sheet, [bench.stroke([[1, y], [15, y]], 8.0 * 0.05 / bench.physics.lam) for y in range(2, 9)])
+        films[name] = sheet.total.mean()
+        band = np.tile(np.abs(np.arange(160) - 80) < 8, 100)
+        old = bench.felt(100, 160)
+        old.total[band], old.used[band], old.layer[band, 0], old.crayon[band, 0] = 20, 1, 20, 2
+        bench.changed(rate_per_mm=0.0).draw(old, [bench.stroke([[1, y], [15, y]], 8.0) for y in range(1, 10)])
+        drifts[name] = (old.film_um().mean(0) * np.arange(160)).sum() / old.film_um().mean(0).sum()
+    assert films["pencil"] < 0.4 * films["metric"] < 0.4 * films["oil-pastel"] / 1.5
+    assert drifts["pencil"] < drifts["metric"] < drifts["oil-pastel"]
+    assert physics("pencil").pigment > physics("oil-pastel").pigment > physics("metric").pigment == 1
+
+
+def test_pigment_colours_the_wax_of_the_same_palette(bench):
+    k, s = Box(bench.palette, bench.physics, 0.1).optics()
+    more_k, more_s = Box(bench.palette, replace(bench.physics, pigment=3.0), 0.1).optics()
+    np.testing.assert_allclose(more_k, 3 * k)
+    np.testing.assert_allclose(more_s, 3 * s)

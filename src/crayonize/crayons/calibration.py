@@ -37,13 +37,12 @@ SHIPPED = Path(__file__).parents[1] / "data" / "tables"
 def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
     """Hatch and measure every crayon of a palette on a paper."""
     crayons = palette.crayons
-    k = np.array([c.k for c in crayons], np.float32)
-    s = np.array([c.s for c in crayons], np.float32)
     grounds = _grounds(palette)
     rows, cols = len(grounds) * len(PRESSURES), len(crayons)
     shape = (round(rows * PATCH_MM / CELL_MM), round(cols * PATCH_MM / CELL_MM))
-    sheet = Sheet(paper.tooth(sheet_paper, *shape, CELL_MM, 0), CELL_MM, k, s)
     constants = physics_of(physics)
+    box = Box(palette, constants, CELL_MM)
+    sheet = Sheet(paper.tooth(sheet_paper, *shape, CELL_MM, 0), CELL_MM, *box.optics())
     base = paper.colour_linear(sheet_paper.colour)
     coats = [
         _hatching(row, col, ground[0], ground[1], 0)
@@ -51,7 +50,7 @@ def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: i
         for col in range(cols)
         if (ground := grounds[row // len(PRESSURES)])
     ]
-    rub.rub(sheet, coats, Box(palette, constants, CELL_MM), threads=threads)
+    rub.rub(sheet, coats, box, threads=threads)
     before, _ = _means(optics.render(sheet, base, light=False, threads=threads), rows, cols)
     top = [
         _hatching(row, col, crayons[col].name, PRESSURES[row % len(PRESSURES)], 1)

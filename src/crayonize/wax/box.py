@@ -35,6 +35,12 @@ class Box:
         self.masks: list[NDArray[np.float32]] = []
         self._index: dict[tuple[Tip, int, int, int], int] = {}
 
+    def optics(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Absorption and scattering per um of each crayon's wax, (crayons, 3) each, linear RGB."""
+        crayons, pigment = self.palette.crayons, np.float32(self.constants.pigment)
+        k = np.array([c.k for c in crayons], np.float32) * pigment
+        return k, np.array([c.s for c in crayons], np.float32) * pigment
+
     def take(
         self,
         strokes: Sequence[Stroke],

@@ -63,6 +63,7 @@ class Physics:
     slip_mm: float  # ... over this length
     step: float  # from one contact to the next, as a share of the tip's extent; 0: cell by cell
     wear: float  # share of a cell's loss that deepens the cell itself; the rest the whole tip shares
+    pigment: float  # how much stronger the wax is coloured than that of crayons, for which palettes are given
     usual: float  # mean of mu * sin(S, F) over a drawing, for the plan of wear
 
     def worn_per_newton_mm(self) -> float:
