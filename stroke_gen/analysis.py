@@ -1,49 +1,22 @@
-"""Reading the photo: target colours, which way strokes run, where detail lies.
+"""Reading the photo: colours that crayons can give, structure, detail.
 
 All maps live on the work grid, a few cells to a crayon's width, whatever the size of photo and sheet.
 """
-
-from collections.abc import Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .colour import from_oklab, oklab
+from .colour import oklab
 from .params import Style
 from .swatches import Swatches
 
 Floats = NDArray[np.float32]
-Box = tuple[float, float, float, float]  # x, y, width, height in fractions of the picture
 WORK_LONG = 640  # cells along the work grid's long side
-CALM = 0.6  # tips: windows over which colours are calmed
-RIM = 0.005  # of the long side: a frame that is not drawn
-FACE_SIDE = 320  # pixels in which faces are looked for
+RIM = 0.006  # of the long side: a frame that is not drawn
 WIDE = 3.0  # cells: wide enough a bell to look smooth on its grid
+KNEE = 0.15  # OKLab L above the darkest crayon from which tones are kept
 WARM = np.deg2rad(58)  # OKLab hue of skin
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What the generator knows of a photo, on the work grid (h, w)."""
-
-    target: Floats  # (h, w, 3) linear colours the drawing should show from afar
-    lab: Floats  # (h, w, 3) the same as OKLab, chroma doubled
-    calm: Floats  # (h, w, 3) linear: flat areas with crisp borders, what a thick crayon aims at
-    tangent: Floats  # (h, w, 2) unit vector along which strokes run, x then y
-    coherence: Floats  # (h, w) 0 no direction of its own .. 1 one clear direction
-    detail: Floats  # (h, w) 0 plain .. 1 eyes, lettering, edges
-    cell_mm: float
-
-    @cached_property
-    def afar(self) -> Floats:
-        """The target as the eye sees it from across the room, OKLab."""
-        return far(self.target)
 
 
 def work_shape(width_mm: float, height_mm: float) -> tuple[int, int]:
@@ -84,49 +57,20 @@ def far(linear: Floats) -> Floats:
     return oklab(wide_blur(linear, 0.012 * max(linear.shape)))
 
 
-def read(
-    photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, focus: Sequence[Box],
-    pool: Executor,
-) -> Scene:  # fmt: skip
-    """Analyse a photo in linear light for a sheet of the given size, as far as these crayons can draw it.
+def structure(lab: Floats, tip: float) -> Floats:
+    """Cosine and sine (h, w, 3) of the double angle along the form, times its energy, and the energy.
 
-    focus: boxes (x, y, w, h) in fractions of the picture that deserve care.
+    A colour structure tensor at two scales, the finest a tip's: strong gradients speak far into flat areas, and
+    what is finer than a stroke says nothing about where strokes run.
     """
-    cell_mm = max(width_mm, height_mm) / WORK_LONG
-    tip = style.tip_mm / cell_mm
-    seen = unframed(fit(photo, work_shape(width_mm, height_mm)))
-    lab = tone_map(oklab(seen), swatches, style)
-    care = pool.submit(lambda: detail(lab, tip, [*focus, *faces(seen)]))
-    target = from_oklab(lab)
-    calm = calmed(target, max(1, round(CALM * tip)))
-    tangent, coherence = orientation(oklab(calm), tip, np.deg2rad(style.wrist_deg), style.wrist)
-    return Scene(target, lab, calm, tangent, coherence, care.result(), cell_mm)
-
-
-def orientation(lab: Floats, tip: float, wrist_rad: float, wrist: float) -> tuple[Floats, Floats]:
-    """Direction of strokes and its coherence, from a colour structure tensor at three scales.
-
-    Directions are averaged as double-angle vectors. Strong gradients speak far into flat areas, and where
-    none does the wrist's own direction takes over, so nothing is ever undefined.
-    """
-    smooth = blur(lab, 0.35 * tip)
+    smooth = blur(lab, 0.5 * tip)
     gx, gy = _scharr(smooth, 1, 0), _scharr(smooth, 0, 1)
     e, f, g = _sum(gx * gx), _sum(gx * gy), _sum(gy * gy)
     cap = np.float32(np.percentile(e + g, 98)) + np.float32(1e-8)
     limit = np.minimum(1, cap / (e + g + 1e-8))
     # The stroke runs along the edge: the double angle of the gradient, turned by half a turn.
     tensor = np.dstack([(g - e) * limit, -2 * f * limit, (e + g) * limit]).astype(np.float32)
-    total = np.zeros_like(tensor)
-    for share, scale in ((1.0, 0.5), (0.6, 1.6), (0.3, 5.0)):
-        total += np.float32(share) * wide_blur(tensor, scale * tip)
-    strength = np.hypot(total[..., 0], total[..., 1])
-    coherence = strength / (total[..., 2] + 1e-6)
-    prior = np.float32(wrist) * np.float32(np.median(total[..., 2]) + 0.02 * cap)
-    c = total[..., 0] + prior * np.float32(np.cos(2 * wrist_rad))
-    s = total[..., 1] + prior * np.float32(np.sin(2 * wrist_rad))
-    angle = 0.5 * np.arctan2(s, c)
-    trust = strength / (strength + prior + np.float32(1e-12))
-    return np.dstack([np.cos(angle), np.sin(angle)]).astype(np.float32), (coherence * trust).astype(np.float32)
+    return np.asarray(0.6 * wide_blur(tensor, 1.2 * tip) + wide_blur(tensor, 4 * tip), np.float32)
 
 
 def _sum(image: Floats) -> Floats:
@@ -163,47 +107,12 @@ def unframed(linear: Floats) -> Floats:
     return np.pad(inner, ((rim, rim), (rim, rim), (0, 0)), mode="edge") if min(inner.shape[:2]) > rim else linear
 
 
-def detail(lab: Floats, tip: float, focus: Sequence[tuple[float, float, float, float]]) -> Floats:
+def detail(lab: Floats, tip: float) -> Floats:
     """Where a sharpened tip is worth taking: fine local contrast that rises over its surroundings."""
     fine = np.sqrt(blur(_sum((lab - blur(lab, 0.8 * tip)) ** 2), 0.6 * tip))
     around = wide_blur(fine, 6 * tip)
     level = np.clip(fine / (0.03 + around) - 0.4, 0, 1.2) / 1.2 * np.clip(fine / 0.06, 0, 1)
-    h, w = level.shape
-    for x, y, width, height in focus:
-        box = np.zeros_like(level)
-        box[int(y * h) : int(np.ceil((y + height) * h)), int(x * w) : int(np.ceil((x + width) * w))] = 1
-        level = np.maximum(level, blur(box, tip))
     return np.asarray(level, np.float32)
-
-
-def faces(target: Floats) -> list[Box]:
-    """Boxes (x, y, w, h), in fractions of the picture, where scikit-image's LBP cascade sees a face.
-
-    A bonus: it misses many faces, so it is asked strictly and nothing depends on it.
-    """
-    h, w = target.shape[:2]
-    scale = min(1.0, FACE_SIDE / max(h, w))
-    small = fit(target, (max(1, round(h * scale)), max(1, round(w * scale))))
-    h, w = small.shape[:2]
-    if min(h, w) < 40:
-        return []
-    grey = cv2.cvtColor((small ** (1 / 2.2) * 255).astype(np.uint8), cv2.COLOR_RGB2GRAY)
-    side = min(h, w)
-    found = _cascade().detectMultiScale(grey, 1.2, 5, minSize=(side // 8, side // 8), maxSize=(side, side))
-    return [(x / w, y / h, width / w, height / h) for x, y, width, height in found]
-
-
-def _cascade() -> Any:
-    """The detector. OpenCV reads scikit-image's file once the misspelt name of one key is put right."""
-    from skimage import data
-
-    path = data.lbp_frontal_face_cascade_filename()  # type: ignore[no-untyped-call]
-    text = Path(path).read_text("ascii")
-    text = text.replace("featuhreParams", "featureParams")
-    storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)  # has to outlive its nodes
-    detector: Any = cv2.CascadeClassifier()
-    detector.read(storage.getFirstTopLevelNode())
-    return detector
 
 
 def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:
@@ -213,14 +122,21 @@ def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:
     return np.ascontiguousarray(np.dstack([c * x - s * y, s * x + c * y]), np.float32)
 
 
+def _toe(lightness: Floats, low: float, darkest: float) -> Floats:
+    """Lightness that stays as it is from KNEE above `darkest` and is drawn together below, `low` to `darkest`."""
+    knee = darkest + KNEE
+    if low >= darkest:
+        return lightness
+    depth = np.clip((knee - lightness) / (knee - low), 0, 1)
+    return np.where(depth > 0, knee - KNEE * (1 - (1 - depth) ** ((knee - low) / KNEE)), lightness).astype(np.float32)
+
+
 def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
     """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in order."""
     given = np.append(swatches.lightness(), oklab(swatches.paper)[0])  # on dark paper crayons are the light
     darkest, lightest = float(given.min()), float(given.max())
     out = lab.copy()
-    low, high = np.percentile(lab[..., 0], (0.5, 99.5))
-    low, high = min(float(low), darkest + 0.02), max(float(high), lightest)
-    out[..., 0] = darkest + (np.clip(lab[..., 0], low, high) - low) / max(high - low, 1e-6) * (lightest - darkest)
+    out[..., 0] = np.minimum(_toe(lab[..., 0], float(np.percentile(lab[..., 0], 0.5)), darkest), lightest)
     out[..., 0] += 4 * style.lift * out[..., 0] * (1 - out[..., 0])
     chroma = np.hypot(lab[..., 1], lab[..., 2])
     warm = np.clip((lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1)

@@ -14,18 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import hand
-from .analysis import Scene, blur
+from .analysis import blur
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .jit import kernel
+from .mixing import BODY_PRICE, SKIN_RAD, foreign
 from .params import Style
+from .scene import Scene
 from .separation import Plan
-from .swatches import Swatches
+from .swatches import Swatches, firmness
 
 Floats = NDArray[np.float32]
 SCALE = 2  # edge pixels per work cell
 BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
+DARKER = 0.16  # OKLab L by which a line is darker than what it bounds
+LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
+TAPER = 4.0  # tips over which a line begins and ends
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
 
@@ -46,9 +51,9 @@ class Lines:
         return Lines(self.points[at], first, self.contrast[at], self.worth[chosen])
 
 
-def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
-    """Outline strokes for a plan whose sheet shows `now` (h, w, 3), light crayons first."""
-    scene, box = plan.scene, plan.swatches.only(plan.recipes.crayons())
+def outlines(plan: Plan, now: Floats, inside: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
+    """Outline strokes for a plan whose sheet shows `now` (h, w, 3), `inside` its margin, light crayons first."""
+    scene, box = plan.scene, plan.swatches
     if style.lines <= 0:
         return []
     tip = Tip("sharp", round(style.line_tip * style.tip_mm, 3))  # as the drawing's file rounds it
@@ -57,7 +62,8 @@ def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) ->
     lines = _edges(scene, lightness, width)
     if style.closed:  # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
         small = _means(_sample(scene.detail, lines.points), lines.first) > 0.45
-        lines = _together(_areas(scene, plan.group, lightness, width), lines.only(np.flatnonzero(small)))
+        lines = _together(_areas(scene, scene.label, lightness, width), lines.only(np.flatnonzero(small)))
+    lines = lines.only(np.flatnonzero(_means(_sample(inside, lines.points), lines.first) > 0.98))
     order = np.argsort(-lines.worth, kind="stable")
     length = np.cumsum(np.diff(lines.first)[order])
     lines = lines.only(order[length <= style.lines * BUDGET * max(scene.detail.shape)])
@@ -66,9 +72,10 @@ def outlines(plan: Plan, now: Floats, style: Style, rng: np.random.Generator) ->
     for k in sorted(set(crayon.tolist()), key=lambda k: -box.lightness()[k]):
         mine = np.flatnonzero(crayon == k)
         some = lines.only(mine)
-        level = np.clip(some.contrast / 0.25, 0.35, 1.0) * np.repeat(pressure[mine], np.diff(some.first))
+        level = np.clip(0.5 + some.contrast / 0.3, 0.5, 1.2) * np.repeat(pressure[mine], np.diff(some.first))
         paths = hand.Paths(some.points, level.astype(np.float32), np.zeros(len(level), np.int32), some.first)
-        strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng)
+        for _ in range(style.search):
+            strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng, TAPER)
     return strokes
 
 
@@ -94,7 +101,7 @@ def _edges(scene: Scene, lightness: Floats, width: float) -> Lines:
     return _lines(fair, scene, lightness, width)
 
 
-def _areas(scene: Scene, group: NDArray[np.int64], lightness: Floats, width: float) -> Lines:
+def _areas(scene: Scene, group: NDArray[np.int32], lightness: Floats, width: float) -> Lines:
     """Closed lines round the larger areas of one colour."""
     chains = []
     for g in np.flatnonzero(np.bincount(group.ravel())):
@@ -126,8 +133,10 @@ def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: f
     aside = np.float32(0.6 * width) * _normals(fair)
     contrast = np.abs(_sample(lightness, fair.points + aside) - _sample(lightness, fair.points - aside))
     mean = _means(contrast, fair.first)
-    detail = _means(_sample(scene.detail, fair.points), fair.first)
-    worth = factor * mean * np.diff(fair.first) ** 0.5 * (1 + 1.5 * detail)
+    who = scene.subject.mask
+    care = _means(_sample(scene.care, fair.points), fair.first)
+    rim = _means(np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)), fair.first)
+    worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
     return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.05))
 
 
@@ -198,12 +207,18 @@ def _sample(image: Floats, points: Floats) -> Floats:
 
 
 def _crayons(lines: Lines, scene: Scene, now: Floats, box: Swatches, style: Style) -> tuple[NDArray[np.int64], Floats]:
-    """For each line the crayon and pressure that come nearest to its darker side, or darker."""
-    aside = np.float32(0.6 * style.line_tip * style.tip_mm / scene.cell_mm) * _normals(lines)
+    """For each line the crayon and pressure that come nearest to its darker side's hue, clearly darker than it."""
+    aside = np.float32(0.8 * style.line_tip * style.tip_mm / scene.cell_mm) * _normals(lines)
     sides = [_means(_sample(scene.lab, lines.points + side * aside), lines.first) for side in (1, -1)]
-    aim = np.where(sides[0][:, :1] <= sides[1][:, :1], *sides) - np.array([0.15 if style.closed else 0.05, 0, 0])
+    darker = np.where(sides[0][:, :1] <= sides[1][:, :1], *sides)
     ground = _means(_sample(now, lines.points), lines.first)
-    colours = oklab(box.over(ground))[:, :, 2:]
-    off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 0.8, 0.8]), axis=3)
+    aim = darker.copy()
+    aim[:, 0] = np.minimum(darker[:, 0], oklab(ground)[:, 0]) - DARKER
+    hardest = box.pressures >= LEAST_PRESSURE
+    colours = oklab(box.over(ground))[:, :, hardest]
+    off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 0.7, 0.7]), axis=3)
+    off += 0.3 * np.maximum(colours[..., 0] - aim[:, None, None, 0] - 0.03, 0)
+    skin = _means(_sample(scene.skin, lines.points), lines.first)
+    off += BODY_PRICE * skin[:, None, None] * foreign(box, SKIN_RAD)[None, :, None]
     k, p = np.divmod(off.reshape(len(off), math.prod(off.shape[1:])).argmin(1), off.shape[2])
-    return k, box.pressures[2 + p] * np.float32(style.line_press)
+    return k, box.pressures[hardest][p] * np.float32(style.line_press * firmness(style.line_tip * style.tip_mm))

@@ -1,35 +1,36 @@
 """The conductor: photo to strokes. It lists the stages and holds no mathematics of its own."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analysis, contours, hand, hatching, recipes, separation
-from .analysis import Scene
-from .colour import oklab
+from . import analysis, contours, hand, hatching, margin, mixing, portrait, scene, separation, touches
+from .analysis import blur
 from .drawing import Stroke, Tip
+from .mixing import LAYERS
 from .params import Pass, Style
+from .scene import Scene
 from .separation import Plan
-from .swatches import Swatches
+from .subject import Subject
+from .swatches import Swatches, firmness
 
 Floats = NDArray[np.float32]
-AGREE = 0.45  # tips over which neighbours agree on a recipe
-RAGGED = 0.12  # of all votes: how raggedly one recipe gives way to the next
-BOLD = 0.3  # distance from the paper, in OKLab, of the colours of an ordinary picture
-FINE_GAIN = 0.02  # the least gain that no pale picture makes smaller
-FAR_SIGHT = 1.5  # how much a free coat makes up for colours that are off when seen from afar
+CROSS = (0, -1, 1, -2)  # turns of the direction from layer to layer, in `cross`
+SUBJECT = 0.5  # care from which the finer tip is taken
 Draw = Callable[[list[Stroke]], None]
 Look = Callable[[tuple[int, int]], Floats]
+Stage = Callable[[Floats], list[Stroke]]
 
 
 def generate(
-    photo: Floats, width_mm: float, height_mm: float, swatches: Swatches, style: Style, seed: int, *,
+    photo: Floats, subject: Subject, width_mm: float, height_mm: float, swatches: Swatches, style: Style, seed: int, *,
     draw: Draw, look: Look, threads: int, focus: Sequence[tuple[float, float, float, float]] = (),
 ) -> list[Stroke]:  # fmt: skip
-    """Strokes for a photo in linear light (h, w, 3), in drawing order.
+    """Strokes for a photo in linear light (h, w, 3) of a subject (see `subject.see`), in drawing order.
 
     draw(strokes) draws further strokes on the open sheet; look(shape) returns what it shows now, as linear light
     on a grid of `shape`: the generator steps back and looks before each coat.
@@ -37,59 +38,102 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
     with ThreadPoolExecutor(threads) as pool:
-        scene = analysis.read(photo, width_mm, height_mm, swatches, style, focus, pool)
-        plan = _plan(scene, swatches, style, rng, pool)
-        boldest = float(np.percentile(np.linalg.norm(scene.lab - oklab(swatches.paper), axis=2), 95))
-        stages = [lambda now, coat=coat: _coat(plan, now, _finer(coat, boldest), style, rng) for coat in style.passes]
-        lines = [lambda now: contours.outlines(plan, now, style, rng)]
-        for stage in lines * style.lines_first + stages + lines:
-            fresh = hand.within(stage(look(plan.group.shape)), width_mm, height_mm)
+        seen = scene.read(photo, subject, width_mm, height_mm, swatches, style, focus, pool)
+        plan = _plan(seen, swatches, style, rng, pool)
+        tip = style.tip_mm / seen.cell_mm
+        inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, tip, rng)
+        inside *= margin.faded(seen.care, style.fade, tip, style.wrist_deg, rng)
+        for stage in _stages(plan, swatches, inside, style, rng):
+            fresh = hand.within(stage(look(seen.label.shape)), width_mm, height_mm)
             draw(fresh)
             strokes += fresh
     return strokes
 
 
-def _plan(scene: Scene, swatches: Swatches, style: Style, rng: np.random.Generator, pool: Executor) -> Plan:
-    """Take crayons out of the box, and part the scene into areas with a recipe and directions of their own."""
-    calm = oklab(scene.calm)
-    mixes = recipes.find(calm, swatches, style.recipes, style.crayons, rng)
-    swatches, mixes = swatches.only(mixes.crayons()), mixes.alone()
-    tip = style.tip_mm / scene.cell_mm
-    ragged = RAGGED * separation.streaks(scene.detail.shape, tip, style.wrist_deg, rng)
-    group = separation.grouped(calm, mixes, AGREE * tip, ragged, pool)
-    fan = style.fan_deg * rng.standard_normal(len(mixes.base)).astype(np.float32)
-    scene = replace(scene, tangent=analysis.turned(scene.tangent, fan[group]))
-    return Plan(scene, swatches, mixes, group, pool)
+def stages(style: Style) -> int:
+    """How many times `generate` draws."""
+    return sum(LAYERS if coat.kind == "fill" else 1 for coat in style.passes) + 2 + 2 * style.lines_first
 
 
-def _finer(coat: Pass, boldest: float) -> Pass:
-    """The coat with a smaller least gain where even the boldest colours are near the paper's: fog, snow, high key."""
-    return replace(coat, gain=max(min(coat.gain, FINE_GAIN), coat.gain * min(1.0, boldest / BOLD)))
+def _stages(
+    plan: Plan, box: Swatches, inside: Floats, style: Style, rng: np.random.Generator
+) -> Iterator[Stage]:
+    """The stages in drawing order. box: all crayons; features of faces may take any."""
+    seen = plan.scene
+    white, features, ovals = portrait.kept(seen.subject, seen.label.shape)
+
+    def lines(now: Floats) -> list[Stroke]:
+        return contours.outlines(plan, now, inside * (1 - ovals), style, rng)
+
+    def faces(now: Floats) -> list[Stroke]:
+        return portrait.draw(seen.subject, seen.natural, inside, box, seen.cell_mm, style, rng)
+
+    if style.lines_first:
+        yield faces
+        yield lines
+    for coat in style.passes:
+        if coat.kind == "touch":
+            yield partial(_touch, plan, inside=inside * (1 - features), coat=coat, style=style, rng=rng)
+            continue
+        for turn in range(LAYERS) if coat.kind == "fill" else (None,):
+            yield partial(_fill, plan, inside=inside * (1 - white), coat=coat, turn=turn, style=style, rng=rng)
+    yield faces
+    yield lines
 
 
-def _coat(plan: Plan, now: Floats, coat: Pass, style: Style, rng: np.random.Generator) -> list[Stroke]:
-    """One coat: choose a crayon for every place, then hatch crayon by crayon, light to dark."""
-    scene, box = plan.scene, plan.swatches
-    width = round(coat.tip * style.tip_mm, 3)  # as the drawing's file rounds it
-    tip = Tip("sharp" if coat.sharp else "blunt", width)
-    cells = width / scene.cell_mm
-    sheet = plan.pool.submit(lambda: analysis.blur(now, 0.5 * cells))
-    tangent = plan.pool.submit(lambda: analysis.turned(scene.tangent, np.float32(coat.angle)))
-    astray = plan.pool.submit(lambda: scene.afar - analysis.far(now)) if coat.kind == "free" else None
-    seen = scene.target if coat.detail > 0 else scene.calm
-    aim = oklab(analysis.blur(seen, coat.soften * 0.5 * cells))
-    streak = separation.streaks(plan.group.shape, cells, style.wrist_deg, rng)
-    if astray:
-        aim += np.float32(FAR_SIGHT) * astray.result()
-    wants = separation.plates(plan, sheet.result(), aim, coat, cells, style.flat, streak)
-    how = hatching.Hatch(
-        coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs, coat.gap * cells, coat.single
-    )
-    rngs, hold = rng.spawn(len(box.names)), replace(style, press=style.press * coat.press)
+def _plan(seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generator, pool: Executor) -> Plan:
+    """Take crayons out of the box."""
+    mixtures = mixing.find(seen, swatches, style.crayons, rng)
+    return Plan(seen, swatches.only(mixtures.crayons()), mixtures.alone(), pool)
 
-    def drawn(k: int) -> list[Stroke]:
-        paths = hatching.hatch(wants[k], tangent.result(), scene.coherence, how, rngs[k])
-        return hand.draw(paths, scene.cell_mm, box.names[k], tip, coat.name, hold, rngs[k])
 
-    order = sorted(wants, key=lambda k: -box.lightness()[k])
-    return [stroke for strokes in plan.pool.map(drawn, order) for stroke in strokes]
+def _fill(
+    plan: Plan, now: Floats, inside: Floats, coat: Pass, turn: int | None, style: Style, rng: np.random.Generator
+) -> list[Stroke]:
+    """One layer of the mixtures, or all once more, light to dark: wide in the ground, finer where care is due."""
+    seen = plan.scene
+    wide = coat.tip * style.tip_mm / seen.cell_mm
+    wants = separation.plates(plan, blur(now, 0.5 * wide), turn, coat.dark_price)
+    tangent = analysis.turned(seen.tangent, np.float32(CROSS[turn] * coat.cross if turn is not None else coat.angle))
+    gaps = (1 + style.open * (1 - seen.care)).astype(np.float32)
+    careful = seen.care > SUBJECT
+    parts = []
+    for k in sorted(wants, key=lambda k: -plan.swatches.lightness()[k]):
+        for factor, where in ((coat.tip, ~careful), (coat.fine, careful)):
+            want = np.where(where, wants[k] * inside, 0).astype(np.float32)
+            if want.any():
+                parts.append((k, factor, want))
+    return _hatched(plan, parts, tangent, gaps, coat, style, rng)
+
+
+def _touch(
+    plan: Plan, now: Floats, inside: Floats, coat: Pass, style: Style, rng: np.random.Generator
+) -> list[Stroke]:
+    """What is still missing and has a shape of its own, crayon by crayon, light to dark."""
+    seen = plan.scene
+    cells = coat.tip * style.tip_mm / seen.cell_mm
+    wants = touches.wanted(plan, blur(now, 0.5 * cells), coat, cells)
+    order = sorted(wants, key=lambda k: -plan.swatches.lightness()[k])
+    parts = [(k, coat.tip, wants[k] * inside) for k in order]
+    return _hatched(plan, parts, seen.tangent, np.ones_like(seen.care), coat, style, rng)
+
+
+def _hatched(
+    plan: Plan, parts: list[tuple[int, float, Floats]], tangent: Floats, gaps: Floats, coat: Pass, style: Style,
+    rng: np.random.Generator,
+) -> list[Stroke]:  # fmt: skip
+    """Hatching of (crayon, tip in usual tips, pressure (h, w)), in that order."""
+    seen, names = plan.scene, plan.swatches.names
+    jobs = list(zip(parts, rng.spawn(len(parts)), strict=True))
+
+    def drawn(job: tuple[tuple[int, float, Floats], np.random.Generator]) -> list[Stroke]:
+        (k, factor, want), own = job
+        tip = Tip("sharp" if coat.sharp else "blunt", round(factor * style.tip_mm, 3))  # as the file rounds it
+        cells = tip.width_mm / seen.cell_mm
+        hold = replace(style, press=style.press * coat.press * firmness(tip.width_mm))
+        how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs,
+                             coat.gap * cells, coat.single)  # fmt: skip
+        paths = hatching.hatch(want, gaps, tangent, seen.coherence, how, own)
+        return hand.draw(paths, seen.cell_mm, names[k], tip, coat.name, hold, own)
+
+    return [stroke for strokes in plan.pool.map(drawn, jobs) for stroke in strokes]

@@ -16,7 +16,7 @@ from .jit import inner_kernel, lean_kernel
 from .params import Style
 
 Floats = NDArray[np.float32]
-TAPER = 0.5  # tips over which a line begins and ends
+TAPER = 1.2  # tips over which a line of hatching begins and ends
 TURN_DIP = 0.15  # share of the pressure lost where a zigzag turns
 TABLE = 8192  # random numbers that slow noise walks through
 
@@ -32,9 +32,10 @@ class Paths:
 
 
 def draw(
-    paths: Paths, scale_mm: float, crayon: str, tip: Tip, note: str, style: Style, rng: np.random.Generator
-) -> list[Stroke]:
-    """Strokes along paths given in units of `scale_mm`."""
+    paths: Paths, scale_mm: float, crayon: str, tip: Tip, note: str, style: Style, rng: np.random.Generator,
+    taper: float = TAPER,
+) -> list[Stroke]:  # fmt: skip
+    """Strokes along paths given in units of `scale_mm`; taper: tips over which they begin and end."""
     number, width = len(paths.first) - 1, tip.width_mm
     if not number:
         return []
@@ -45,7 +46,7 @@ def draw(
     path, along = paths.points.astype(np.float64) * scale_mm, np.empty(len(paths.points))
     xy, force_n = np.empty(path.shape, np.float32), np.empty(len(path), np.float32)
     _lead(path, paths.first, beyond, along, wobble, style.wobble * width, 4 * width, xy)
-    _press(along, paths.pressure, paths.leg, paths.first, firmness, swell, style.swell, 5 * width, TAPER * width,
+    _press(along, paths.pressure, paths.leg, paths.first, firmness, swell, style.swell, 5 * width, taper * width,
            TURN_DIP, 0.785 * width**2 * style.press, force_n)  # fmt: skip
     bounds = paths.first.tolist()
     return [Stroke(xy[a:b], force_n[a:b], crayon, tip, note) for a, b in pairwise(bounds)]
@@ -131,5 +132,5 @@ def _press(along, pressure, leg, first, firmness, swell, swelling, wave, taper, 
                 force *= 1 - dip
             elif _turns(leg, i + 1, i + 2, a, b) or _turns(leg, i - 2, i - 1, a, b):
                 force *= 1 - dip / 2
-            force *= min(0.55 + 0.45 * min(along[i], along[b] - along[i]) / taper, 1.0)
+            force *= min(0.4 + 0.6 * min(along[i], along[b] - along[i]) / taper, 1.0)
             force_n[i] = np.floor(min(max(force * area, 0.02), 60.0) * 1000 + 0.5) / 1000

@@ -70,14 +70,15 @@ def _leg(x, y, dx, dy, want, tangent, stamp, fine, step, reach, gap, sharpest, o
 
 
 @lean_kernel
-def _press(stamp, path, n, spacing, fine):  # type: ignore[no-untyped-def]
+def _press(stamp, path, n, spacing, gaps, fine):  # type: ignore[no-untyped-def]
     """Stamp discs along a path: 2 where no other line may come, 1 where none may begin.
 
     Without the second, lines would be squeezed in half-way between two that lie just right.
     """
-    inner, outer = spacing * fine * 0.46, spacing * fine * 0.75
     h, w = stamp.shape
     for p in range(n):
+        own = spacing * gaps[int(path[p, 1]), int(path[p, 0])] * fine
+        inner, outer = own * 0.46, own * 0.75
         cx, cy = path[p, 0] * fine - 0.5, path[p, 1] * fine - 0.5
         for j in range(max(0, int(np.ceil(cy - outer))), min(h, int(np.floor(cy + outer)) + 1)):
             half = np.sqrt(outer * outer - (j - cy) ** 2)
@@ -90,7 +91,7 @@ def _press(stamp, path, n, spacing, fine):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs, gap, single, step, fine, stamp,  # type: ignore[no-untyped-def]
+def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing, shortest, reach, legs, gap, single, step, fine, stamp,  # type: ignore[no-untyped-def]
            points, first, leg_of):  # fmt: skip
     """Zigzags from `seeds` (n, 2) in order. Writes points (m, 2), leg_of (m,), first (strokes + 1); returns strokes."""
     h, w = want.shape
@@ -136,7 +137,7 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
             for p in range(m):
                 points[used, 0], points[used, 1], leg_of[used] = back[p, 0], back[p, 1], leg
                 used += 1
-            _press(stamp, points[begin:used], used - begin, spacing, fine)
+            _press(stamp, points[begin:used], used - begin, spacing, gaps, fine)
             # The next leg begins beside this end, or further back where the crayon is still wanted.
             ex, ey = points[used - 1, 0], points[used - 1, 1]
             q = max(begin, used - 2)
@@ -146,8 +147,9 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
                 break
             tx, ty = tx / norm, ty / norm
             found = False
-            for p in range(used - 1, max(begin, used - 1 - int(np.float32(3) * spacing / step)), -1):
-                nx, ny = points[p, 0] - side * ty * spacing, points[p, 1] + side * tx * spacing
+            beside = spacing * gaps[int(ey), int(ex)]
+            for p in range(used - 1, max(begin, used - 1 - int(np.float32(3) * beside / step)), -1):
+                nx, ny = points[p, 0] - side * ty * beside, points[p, 1] + side * tx * beside
                 if 0 <= nx < w and 0 <= ny < h and want[int(ny), int(nx)] > 0 and _free(stamp, nx, ny, fine, 1):
                     x, y, found = nx, ny, True
                     break
@@ -160,8 +162,10 @@ def _hatch(want, tangent, coherence, seeds, luck, spacing, shortest, reach, legs
     return strokes
 
 
-def hatch(want: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator) -> Paths:
-    """Zigzags over want > 0, whose values are the pressure; paths in work cells."""
+def hatch(
+    want: Floats, gaps: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator
+) -> Paths:
+    """Zigzags over want > 0, whose values are the pressure; gaps (h, w) widen the spacing; paths in work cells."""
     h, w = want.shape
     seeds = _seeds(want, how, rng)
     stamp = np.zeros((h * FINE, w * FINE), np.uint8)
@@ -171,7 +175,7 @@ def hatch(want: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.
     first = np.zeros(len(seeds) + 2, np.int64)
     luck = rng.random(4099, np.float32)
     numbers = [np.float32(v) for v in (how.spacing, how.shortest, how.reach)]
-    strokes = _hatch(want, tangent, coherence, seeds, luck, *numbers, how.legs, np.float32(how.gap),
+    strokes = _hatch(want, gaps, tangent, coherence, seeds, luck, *numbers, how.legs, np.float32(how.gap),
                      np.float32(how.single), np.float32(STEP), FINE, stamp, points, first, leg_of)  # fmt: skip
     first = first[: strokes + 1]
     points = points[: first[-1]]

@@ -20,25 +20,28 @@ class Pass:
     """One coat of hatching over the whole sheet, after a look at what is there."""
 
     name: str = "coat"
-    kind: Annotated[str, "base", "shade", "free"] = "free"  # by the recipe, or free: what helps most after a look
+    kind: Annotated[str, "fill", "add", "touch"] = "fill"  # the mixtures in layers; once more; shapes
     tip: Annotated[float, 0.2, 4] = 1.0  # width of the tip, in usual tips
+    fine: Annotated[float, 0.2, 4] = 0.65  # the same where care is due
     sharp: bool = False  # a sharpened tip
     spacing: Annotated[float, 0.3, 2] = 0.62  # tips between lines; below 0.5 the hatch closes
     shortest: Annotated[float, 0.3, 20] = 2.5  # tips: shorter lines are left out
-    reach: Annotated[float, 1, 60] = 14.0  # tips: the longest line without moving the arm
-    legs: Annotated[int, 1, 60] = 10  # lines in one zigzag
-    angle: Annotated[float, -90, 90] = 0.0  # degrees against the field, so that coats cross
-    cohere: Annotated[float, 0, 6] = 1.0  # tips over which neighbours agree on a crayon
-    edge: Annotated[float, 0.1, 2] = 0.4  # tips: share of the tip that must gain; small keeps borders crisp
-    hardest: Annotated[float, 0.03, 2] = 2.0  # N/mm^2 at most, so that what lies below stays to be seen
+    reach: Annotated[float, 1, 60] = 20.0  # tips: the longest line without moving the arm
+    legs: Annotated[int, 1, 60] = 12  # lines in one zigzag
+    cross: Annotated[float, 0, 90] = 18.0  # degrees by which the direction turns from layer to layer
+    angle: Annotated[float, -90, 90] = 0.0  # degrees against the surface's direction
     press: Annotated[float, 0.1, 5] = 1.0  # factor on its forces: wax takes hold of wax less than of paper
-    gain: Annotated[float, 0, 1] = 0.02  # least gain in colour (OKLab) for which the hand moves
-    detail: Annotated[float, 0, 1] = 0.0  # only where the photo has at least this much detail
-    tone: Annotated[float, 0, 4] = 1.0  # weight of lightness against colour: small in a first coat that seeks the hue
-    dark_price: Annotated[float, 0, 4] = 0.5  # reluctance to go darker than the photo
-    soften: Annotated[float, 0, 4] = 0.5  # tips: the target is looked at this blurred
+    dark_price: Annotated[float, 0, 4] = 0.3  # reluctance to go darker than the photo
     gap: Annotated[float, 0, 4] = 0.4  # tips of unwanted ground a line may cross
-    single: Annotated[float, 0, 1] = 0.5  # coherence from which lines are drawn singly, as hair is
+    single: Annotated[float, 0, 1] = 0.75  # coherence from which lines are drawn singly, as hair is
+    cohere: Annotated[float, 0, 6] = 0.5  # touch: tips over which neighbours agree on a crayon
+    edge: Annotated[float, 0.1, 2] = 0.35  # touch: share of the tip that must gain; small keeps borders crisp
+    hardest: Annotated[float, 0.03, 2] = 2.0  # touch: N/mm^2 at most
+    gain: Annotated[float, 0, 1] = 0.03  # touch: least gain in colour (OKLab) for which the hand moves
+    detail: Annotated[float, 0, 1] = 0.1  # touch: only where the photo has at least this much detail
+    tone: Annotated[float, 0, 4] = 1.0  # touch: weight of lightness against colour
+    soften: Annotated[float, 0, 4] = 0.3  # touch: tips; the target is looked at this blurred
+    least: Annotated[float, 0, 100] = 4.0  # touch: square tips; smaller shapes are left out
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,11 @@ class Style:
 
     title: str = ""
     tip_mm: Annotated[float, 0.5, 30] = 2.4  # width of the usual tip
-    crayons: Annotated[int, 1, 64] = 16  # most crayons taken out of the box
-    recipes: Annotated[int, 1, 100] = 30  # kinds of colour told apart
+    crayons: Annotated[int, 1, 64] = 10  # most crayons taken out of the box
+    merge: Annotated[float, 0.01, 1] = 0.06  # OKLab units by which two large surfaces must differ to be two
+    open: Annotated[float, 0, 4] = 0.5  # how much wider the hatching of the ground is than the subject's
+    fade: Annotated[float, 0, 1] = 0.0  # share of the sheet that is left out, the farthest from the subject
+    margin_mm: Annotated[float, 0, 50] = 2.0  # paper left along the sheet's border
     chroma: Annotated[float, 0, 3] = 1.0  # colourfulness asked for
     lift: Annotated[float, 0, 0.25] = 0.0  # middle tones drawn lighter than they are, as paper is lighter than a photo
     skin: Annotated[float, 0, 3] = 0.45  # more colour for pale warm tones, so that skin stays skin
@@ -62,8 +68,10 @@ class Style:
     flat: Annotated[float, 0, 1] = 0.0  # one pressure for all of a colour instead of following its tone
     fan_deg: Annotated[float, 0, 90] = 0.0  # spread of directions from one colour's areas to another's
     lines: Annotated[float, 0, 5] = 1.0  # amount of outline
+    search: Annotated[int, 1, 4] = 1  # how many times a line is drawn until it sits
     closed: bool = False  # outlines go round whole areas instead of along edges
     lines_first: bool = False  # outlines before the fill, as children draw; drawn once more at the end
+    symbols: Annotated[int, 0, 10] = 0  # age of the child who sets faces down as symbols; 0: as they look
     line_tip: Annotated[float, 0.2, 3] = 0.45  # width of the outline's tip, in usual tips
     line_press: Annotated[float, 0.1, 5] = 1.0  # factor on the force of outlines
     passes: tuple[Pass, ...] = (Pass(),)
@@ -147,21 +155,14 @@ def with_age(style: Style, age: int) -> Style:
     if not 3 <= age <= 10:
         raise ValueError(f"age: {age} is not between 3 and 10")
     young = (10 - age) / 7
-    passes = tuple(
-        replace(
-            p,
-            spacing=p.spacing * (0.9 + 0.35 * young),
-            soften=p.soften * (0.6 + young),
-            cohere=p.cohere * (0.6 + young),
-        )
-        for p in style.passes
-    )
+    passes = tuple(replace(p, spacing=p.spacing * (0.9 + 0.35 * young)) for p in style.passes)
     return replace(
         style,
         passes=passes,
         tip_mm=style.tip_mm * (0.75 + 0.6 * young),
         crayons=round(9 - 4 * young),
-        recipes=round(13 - 7 * young),
+        merge=0.12 + 0.05 * young,
+        symbols=age,
         overshoot=0.2 + 0.6 * young,
         wobble=0.06 + 0.2 * young,
         force_spread=0.15 + 0.25 * young,

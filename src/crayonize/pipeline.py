@@ -7,9 +7,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from stroke_gen import generate as generator
+from stroke_gen import subject
 from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
-from stroke_gen.generate import generate
 
 from .crayons import calibration
 from .crayons.palette import Palette, load_palette
@@ -120,6 +121,7 @@ def sketch(
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
+    who = subject.see(photo, work_shape(width_mm, height_mm))
     photo = fit(photo, work_shape(width_mm, height_mm))  # all that is looked at; the large one may go
     style = settings.hand
     blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
@@ -127,7 +129,7 @@ def sketch(
                   palette=settings.box, ground=settings.ground)  # fmt: skip
     stand.show_to(watch)
     table = calibration.swatches(settings.box, settings.ground, settings.physics, stand.threads)
-    stages = len(style.passes) + 1 + style.lines_first
+    stages = generator.stages(style)
     done = 0
 
     def draw(strokes: list[Stroke]) -> None:
@@ -137,8 +139,10 @@ def sketch(
             stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
         done += 1
 
-    strokes = generate(photo, width_mm, height_mm, table, style, settings.seed, draw=draw, look=stand.seen,
-                       threads=stand.threads, focus=settings.focus)  # fmt: skip
+    strokes = generator.generate(
+        photo, who, width_mm, height_mm, table, style, settings.seed,
+        draw=draw, look=stand.seen, threads=stand.threads, focus=settings.focus,
+    )  # fmt: skip
     drawing = Drawing(
         width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed
     )

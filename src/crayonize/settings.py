@@ -40,7 +40,7 @@ class Settings:
     style: str = "artist"  # a shipped name or a .toml file
     force: str | float = "normal"  # light, normal, heavy, or a factor
     size: int = 1600  # long side of the picture in pixels
-    sheet_mm: float = 297.0  # long side of the sheet: A4
+    sheet_mm: float = 210.0  # long side of the sheet: A5
     seed: int = 0
     physics: str = "metric"  # the medium: metric is a crayon, or oil-pastel, pencil
     threads: int | None = None  # all cores

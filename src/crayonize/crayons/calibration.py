@@ -1,6 +1,6 @@
 """The stroke generator's table of crayons, measured on the simulator itself.
 
-Every crayon is hatched at six pressures over five grounds (bare paper, and coats of a middle and the
+Every crayon is hatched at six pressures over four grounds (bare paper, and coats of the lightest, a middle and the
 darkest crayon); a line per channel through "before, after" gives `a` and `b` of the table. The tables of
 the shipped palettes on the default paper are part of the package (`python -m crayonize.crayons.calibration` measures
 them anew); others are measured once and kept in the user's cache folder.
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stroke_gen.drawing import Stroke, Tip
-from stroke_gen.swatches import Swatches
+from stroke_gen.swatches import TIP_MM, Swatches
 
 from ..light import optics
 from ..machine import cores, folder, kernels, source
@@ -27,7 +27,7 @@ from ..wax.sheet import Sheet
 from .palette import Palette, load_palette, palette_names
 
 PRESSURES = (0.04, 0.1, 0.2, 0.38, 0.62, 0.95)  # N/mm^2
-TIP = Tip("blunt", 2.4)
+TIP = Tip("blunt", TIP_MM)
 SPACING = 0.62  # of the tip's width
 PATCH_MM, EDGE_MM = 11.0, 2.5  # a swatch, and what is left out of the mean around it
 CELL_MM = 297 / 1600
@@ -68,10 +68,9 @@ def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: i
 
 
 def _grounds(palette: Palette) -> list[tuple[str, float] | None]:
-    """Bare paper, a middle crayon light and heavy, the darkest crayon light and heavy."""
+    """Bare paper, and coats of the lightest crayon, a middle one and the darkest."""
     order = sorted(palette.crayons, key=lambda c: sum(c.k) / sum(c.s))
-    middle, dark = order[len(order) // 2].name, order[-1].name
-    return [None, (middle, PRESSURES[2]), (middle, PRESSURES[4]), (dark, PRESSURES[1]), (dark, PRESSURES[4])]
+    return [None, *((order[i].name, PRESSURES[3]) for i in (0, len(order) // 2, -1))]
 
 
 def _hatching(row: int, col: int, crayon: str, pressure: float, turn: int) -> Stroke:
@@ -106,12 +105,18 @@ def _means(picture: NDArray[np.float32], rows: int, cols: int) -> tuple[NDArray[
 
 
 def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Line after = a * before + b per crayon, pressure and channel, exact on bare paper (grounds, p, k, 3)."""
-    bare_x, bare_y = before[0], after[0]
-    dx, dy = before[1:] - bare_x, after[1:] - bare_y
-    a = np.clip((dx * dy).sum(0) / np.maximum((dx * dx).sum(0), 1e-6), 0, 1)
-    b = np.maximum(bare_y - a * bare_x, 0)
-    return (np.ascontiguousarray(a.swapaxes(0, 1), np.float32), np.ascontiguousarray(b.swapaxes(0, 1), np.float32))
+    """Lines after = a * before + b per crayon, pressure and channel, from (grounds, p, k, 3): (2, k, p, 3) each.
+
+    The first goes exactly through what bare paper gave, the second through the means of the waxed grounds.
+    """
+    x, y = before[1:], after[1:]
+    lines = []
+    for through_x, through_y in ((before[0], after[0]), (x.mean(0), y.mean(0))):
+        dx, dy = x - through_x, y - through_y
+        a = np.clip((dx * dy).sum(0) / np.maximum((dx * dx).sum(0), 1e-6), 0, 1)
+        lines.append((a, np.maximum(through_y - a * through_x, 0)))
+    a, b = (np.stack(m).swapaxes(1, 2) for m in zip(*lines, strict=True))
+    return np.ascontiguousarray(a, np.float32), np.ascontiguousarray(b, np.float32)
 
 
 def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
