@@ -83,8 +83,8 @@ def photo_parser() -> Parser:
         "--medium",
         dest="physics",
         type=_medium,
-        default=Settings.physics,
-        help="what is drawn with: crayon, oil-pastel or pencil (crayon)",
+        default="crayon",
+        help="what is drawn with: crayon, oil-pastel or pencil (%(default)s)",
     )
     add("--age", type=_whole, help="of the one who draws in style child, 3 to 10")
     add("--left-handed", action="store_true", help="hatching leans the other way")
@@ -183,8 +183,7 @@ def add_talk(parser: Parser) -> None:
 def _medium(word: str) -> str:
     """The constants of what is drawn with, by the name that a user has for it."""
     if word not in MEDIA:
-        near = did_you_mean(word, MEDIA)
-        raise argparse.ArgumentTypeError(f"{word!r} is none of {', '.join(MEDIA)}{near}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no medium{did_you_mean(word, MEDIA)}")
     return MEDIA[word]
 
 
