@@ -80,7 +80,7 @@ def test_bent_strokes_drawn_again_look_the_same(live):
     mine, again = (decode_srgb(p) for p in (live.picture(), api.draw(live.drawing(), SIZE)))
     apart = np.abs(cv2.blur(mine, (15, 15)) - cv2.blur(again, (15, 15)))
     assert np.abs(mine - again).max() > 0  # this is why it is asked
-    assert apart.max() < 0.14 and apart.mean() < 0.01
+    assert apart.max() < 0.18 and apart.mean() < 0.01
 
 
 @pytest.mark.parametrize("light", [True, False])

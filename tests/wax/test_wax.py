@@ -444,8 +444,8 @@ def test_a_stride_is_a_share_of_the_tip_along_its_way(angle):
     for kind, width, along, breadth in (("blunt", 2.4, 2.4, 2.4), ("side", 20.0, 20.0, 2.6), ("rim", 6.0, 3.9, 6.0)):
         for heading, extent in ((angle, along), (angle + 90, breadth)):
             tip = Tip(kind, width, angle_deg=angle)
-            strides = 24 / contacts_on_a_way(physics("metric"), tip, 24.0, heading)
-            assert strides == pytest.approx(0.14 * extent, rel=0.3)
+            strides = 48 / contacts_on_a_way(physics("metric"), tip, 48.0, heading)
+            assert strides == pytest.approx(physics("metric").step * extent, rel=0.3)
 
 
 def contacts_on_a_way(wax_physics, tip, length_mm, heading=0.0, cell_mm=0.1):
@@ -523,8 +523,7 @@ def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
     film = sheet.film_um()[n // 4 : -n // 4, n // 4 : -n // 4].astype(float)
     fine = film - (np.roll(film, 1, 0) + np.roll(film, -1, 0) + np.roll(film, 1, 1) + np.roll(film, -1, 1)) / 4
     fine = fine[2:-2, 2:-2]
-    assert fine.std() < 0.075 * film.mean()
-    assert (fine[1:] * fine[:-1]).mean() > -0.265 * fine.var()  # every other cell high: -.31, -.35 if nothing yields
+    assert fine.std() < (0.075 if um == 10 else 0.065) * film.mean()  # .092 under heavy force if nothing yields
 
 
 def test_nothing_is_pressed_harder_than_wax_bears(bench):
