@@ -15,6 +15,7 @@ Floats = NDArray[np.float32]
 WORK_LONG = 640  # cells along the work grid's long side
 RIM = 0.006  # of the long side: a frame that is not drawn
 WIDE = 3.0  # cells: wide enough a bell to look smooth on its grid
+WHITE = 0.83  # OKLab L from which what has no colour turns into bare paper
 KNEE = 0.15  # OKLab L above the darkest crayon from which tones are kept
 WARM = np.deg2rad(58)  # OKLab hue of skin
 
@@ -139,6 +140,8 @@ def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
     out[..., 0] = np.minimum(_toe(lab[..., 0], float(np.percentile(lab[..., 0], 0.5)), darkest), lightest)
     out[..., 0] += 4 * style.lift * out[..., 0] * (1 - out[..., 0])
     chroma = np.hypot(lab[..., 1], lab[..., 2])
+    white = np.clip((out[..., 0] - WHITE) / (lightest - WHITE - 0.03), 0, 1) * np.clip(2 - chroma / 0.03, 0, 1)
+    out[..., 0] += white * white * (3 - 2 * white) * (lightest - out[..., 0])
     warm = np.clip((lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1)
     shy = np.exp(-((chroma / 0.18) ** 2)) * np.clip(chroma / 0.05, 0, 1)
     out[..., 1:] *= (style.chroma * (1 + style.skin * warm**2 * shy))[..., None]

@@ -137,7 +137,7 @@ def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: f
     care = _means(_sample(scene.care, fair.points), fair.first)
     rim = _means(np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)), fair.first)
     worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
-    return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.05))
+    return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.08))
 
 
 def _end_to_end(chains: Sequence[NDArray[Any]]) -> tuple[Floats, NDArray[np.int64]]:

@@ -22,7 +22,7 @@ Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
 LAYERS = 4  # crayons in a mixture at most
 SAMPLES = 24  # colours by which a surface is judged
-GRAIN_PRICE = 0.15  # OKLab units per unit of grain
+GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
@@ -219,9 +219,9 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
-    price += GREY_PRICE * np.outer(np.maximum(chroma - 0.05, 0), greyness(heavy))
+    price += GREY_PRICE * np.outer(np.maximum(chroma - 0.025, 0), greyness(heavy))
     loud = np.linalg.norm(hue, axis=1)
-    price += LOUD_PRICE * np.maximum(loud[None] - 1.4 * chroma[:, None] - 0.1, 0)
+    price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
     darkest = np.percentile(sample[:, 0], 10, axis=1)
     price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.15, 0)
     return price.astype(np.float32)
@@ -239,10 +239,10 @@ def foreign(swatches: Swatches, width_rad: float) -> Floats:
 
 
 def clash(one: Floats, other: Floats) -> Floats:
-    """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are within 60 degrees."""
+    """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are within 44 degrees."""
     dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
     both = np.sqrt((one**2).sum(-1) * (other**2).sum(-1))
-    return np.asarray(np.sqrt(np.maximum(0.5 * both - dot, 0)))
+    return np.asarray(np.sqrt(np.maximum(0.72 * both - dot, 0)))
 
 
 def greyness(colours: Floats) -> Floats:

@@ -18,7 +18,7 @@ from .swatches import Swatches
 Floats = NDArray[np.float32]
 Box = tuple[float, float, float, float]  # x, y, width, height in fractions of the picture
 CALM = 0.5  # tips: windows over which colours are calmed where no care is due
-WINDOW = 1.4  # tips: the windows in which a plate follows the photo's colours
+WINDOW = 1.1  # tips: the windows in which a plate follows the photo's colours
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,7 +121,7 @@ def test_draw_takes_a_drawing_made_by_hand(tmp_path):
     ({"style": "x"}, ValueError, "style"),
     ({"size": 0}, ValueError, "size: 0"),
     ({"size": 100.0}, ValueError, "size: 100.0"),
-    ({"seed": True}, ValueError, "seed: True"),
+    ({"seed": True}, ValueError, "seed: true"),
     ({"threads": 0}, ValueError, "threads: 0"),
     ({"focus": [(0, 0, 1)]}, ValueError, "focus"),
     ({"out": "/nowhere/out.png"}, ValueError, "nowhere"),

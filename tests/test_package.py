@@ -8,7 +8,7 @@ import pytest
 import crayonize
 import stroke_gen
 from crayonize import cli
-from crayonize.crayons.palette import load_palette, palette_names
+from crayonize.crayons.palette_files import load_palette, palette_names
 from crayonize.wax.paper import load_paper, papers
 from stroke_gen.params import load_style, style_names
 

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from crayonize.crayons.palette import load_palette
+from crayonize.crayons.palette_files import load_palette
 from crayonize.images.icc import encode_srgb
 from crayonize.images.write import write_image
 from crayonize.machine import kernels

@@ -30,10 +30,9 @@ if TYPE_CHECKING:
     from stroke_gen.drawing import Drawing
 
     from .images.read import Photo, Source
-    from .pipeline import Easel, Watch
+    from .pipeline import Easel, Onlooker, Progress
 
 
-Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
 MAX_SEED = 2**63 - 1
 MAX_SIZE = 20_000  # pixels along the long side
 MAX_THREADS = 256
@@ -214,7 +213,7 @@ def filming(
     seconds: float = 12.0,
     show_tip: bool = False,
     light: bool = True,
-) -> AbstractContextManager[Watch | None]:
+) -> AbstractContextManager[Onlooker | None]:
     """What `sketch` and `redraw` take as `watch` to film the drawing into `path`; nothing for
     None.
     """
@@ -231,7 +230,7 @@ def sketch(
     image: Source | Photo,
     settings: Settings,
     progress: Progress | None = None,
-    watch: Watch | None = None,
+    watch: Onlooker | None = None,
 ) -> tuple[Drawing, Easel]:
     """Plan and draw a photo: its Drawing, and the sheet it was drawn on."""
     from .images.read import open_photo
@@ -253,7 +252,7 @@ def redraw(
     progress: Progress | None = None,
     *,
     out: str | os.PathLike[str] | None = None,
-    watch: Watch | None = None,
+    watch: Onlooker | None = None,
 ) -> tuple[Drawing, Easel]:
     """Draw a Drawing, or a drawing's file, on a blank sheet of `size` pixels: the Drawing, and the
     sheet.

@@ -13,7 +13,8 @@ from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
 
 from .crayons import calibration
-from .crayons.palette import Palette, load_palette
+from .crayons.palette import Palette
+from .crayons.palette_files import load_palette
 from .light import optics
 from .machine import cores
 from .settings import Settings
@@ -25,14 +26,17 @@ from .wax.sheet import Sheet
 Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
 
 
-class Watch(Protocol):
+class Onlooker(Protocol):
     """Someone who looks on while a drawing is made."""
 
     def open(self, easel: "Easel") -> None:
         """A bare sheet is on the easel."""
 
     def strokes(self, strokes: Sequence[Stroke], share: float) -> rub.Watch | None:
-        """Strokes are about to be drawn; `share` of the whole work they are (0..1). None: no need to tell of each."""
+        """Strokes are about to be drawn; `share` of the whole work they are (0..1).
+
+        None: no need to tell of each.
+        """
 
 
 @dataclass
@@ -44,14 +48,24 @@ class Easel:
     ground: tuple[float, float, float]
     threads: int
     smears: bool = True
-    watch: Watch | None = None
+    watch: Onlooker | None = None
 
-    def draw(self, strokes: Sequence[Stroke], progress: rub.Progress | None = None, share: float = 1.0) -> None:
+    def draw(
+        self, strokes: Sequence[Stroke], progress: rub.Progress | None = None, share: float = 1.0
+    ) -> None:
         """Draw strokes, in order, onto what is there; `share` of the whole drawing they are."""
         watch = self.watch.strokes(strokes, share) if self.watch else None
-        rub.rub(self.sheet, strokes, self.box, threads=self.threads, smears=self.smears, progress=progress, watch=watch)
+        rub.rub(
+            self.sheet,
+            strokes,
+            self.box,
+            threads=self.threads,
+            smears=self.smears,
+            progress=progress,
+            watch=watch,
+        )
 
-    def show_to(self, watch: Watch | None) -> None:
+    def show_to(self, watch: Onlooker | None) -> None:
         """Let someone look on from now."""
         self.watch = watch
         if watch:
@@ -66,7 +80,7 @@ class Easel:
         return optics.render_srgb(self.sheet, self.ground, light=light, threads=self.threads)
 
     def seen(self, shape: tuple[int, int]) -> NDArray[np.float32]:
-        """The sheet as linear RGB on a grid of `shape`, without light: what the generator looks at."""
+        """The sheet as linear RGB on a grid of `shape`, without light: what the generator sees."""
         if shape[0] > self.sheet.rows or shape[1] > self.sheet.cols:
             return fit(self.picture(light=False), shape)
         return optics.render_reduced(self.sheet, self.ground, shape, threads=self.threads)
@@ -87,11 +101,16 @@ def easel(
     palette = palette or load_palette(drawing.palette)
     sheet_paper = ground or paper.load_paper(drawing.paper)
     cell_mm = max(drawing.width_mm, drawing.height_mm) / size
-    rows, cols = max(1, round(drawing.height_mm / cell_mm)), max(1, round(drawing.width_mm / cell_mm))
+    rows, cols = (
+        max(1, round(drawing.height_mm / cell_mm)),
+        max(1, round(drawing.width_mm / cell_mm)),
+    )
     tooth = paper.tooth(sheet_paper, rows, cols, cell_mm, drawing.seed)
     box = Box(palette, physics(drawing.physics), cell_mm, drawing.seed)
     sheet = Sheet(tooth, cell_mm, *box.optics())
-    return Easel(sheet, box, paper.colour_linear(sheet_paper.colour), threads or cores.allowed(), smears)
+    return Easel(
+        sheet, box, paper.colour_linear(sheet_paper.colour), threads or cores.allowed(), smears
+    )
 
 
 def draw(
@@ -100,9 +119,8 @@ def draw(
     *,
     threads: int | None = None,
     preview: bool = False,
-    light: bool = True,
     progress: Progress | None = None,
-    watch: Watch | None = None,
+    watch: Onlooker | None = None,
 ) -> Easel:
     """A drawing on paper, `size` cells along the long side; `.picture()` shows it.
 
@@ -115,18 +133,29 @@ def draw(
 
 
 def sketch(
-    photo: NDArray[np.float32], settings: Settings, progress: Progress | None = None, watch: Watch | None = None
+    photo: NDArray[np.float32],
+    settings: Settings,
+    progress: Progress | None = None,
+    watch: Onlooker | None = None,
 ) -> tuple[Drawing, Easel]:
-    """Plan and draw a photo in linear light (h, w, 3): its Drawing and the sheet it was drawn on."""
+    """Plan and draw a photo in linear light (h, w, 3): its Drawing, and the sheet drawn on."""
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
     who = subject.see(photo, work_shape(width_mm, height_mm))
-    photo = fit(photo, work_shape(width_mm, height_mm))  # all that is looked at; the large one may go
+    # all that is looked at; the large one may go
+    photo = fit(photo, work_shape(width_mm, height_mm))
     style = settings.hand
-    blank = Drawing(width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed)
-    stand = easel(blank, max(1, settings.size // 2) if settings.preview else settings.size, settings.threads,
-                  palette=settings.box, ground=settings.ground)  # fmt: skip
+    blank = Drawing(
+        width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed
+    )
+    stand = easel(
+        blank,
+        max(1, settings.size // 2) if settings.preview else settings.size,
+        settings.threads,
+        palette=settings.box,
+        ground=settings.ground,
+    )
     stand.show_to(watch)
     table = calibration.swatches(settings.box, settings.ground, settings.physics, stand.threads)
     stages = generator.stages(style)
@@ -136,7 +165,11 @@ def sketch(
         nonlocal done
         if strokes:
             base, name = done / stages, strokes[0].note
-            stand.draw(strokes, progress and (lambda n, m: progress(name, base + n / m / stages)), 1 / stages)
+            stand.draw(
+                strokes,
+                progress and (lambda n, m: progress(name, base + n / m / stages)),
+                1 / stages,
+            )
         done += 1
 
     strokes = generator.generate(
@@ -144,6 +177,12 @@ def sketch(
         draw=draw, look=stand.seen, threads=stand.threads, focus=settings.focus,
     )  # fmt: skip
     drawing = Drawing(
-        width_mm, height_mm, settings.paper, settings.palette, tuple(strokes), settings.physics, settings.seed
+        width_mm,
+        height_mm,
+        settings.paper,
+        settings.palette,
+        tuple(strokes),
+        settings.physics,
+        settings.seed,
     )
     return drawing, stand

@@ -53,7 +53,7 @@ class Settings:
     @cached_property
     def box(self) -> Palette:
         """The palette, read; ValueError if there is none of this name."""
-        from .crayons.palette import load_palette
+        from .crayons.palette_files import load_palette
 
         return load_palette(self.palette)
 

@@ -71,9 +71,9 @@ def test_a_signal_ends_the_run_soon(desk: Desk, dice: random.Random, chance: int
 
 
 def test_a_second_ctrl_c_ends_it_at_once(desk: Desk) -> None:
+    photo(desk.photos / "first.png")
     run = desk.fill(4, 600).start("--grace", "600")
-    run.wait_until(lambda: len(run.workers()) == 2)
-    time.sleep(0.5)
+    run.wait_until(run.begun())
     os.killpg(run.process.pid, signal.SIGINT)
     time.sleep(0.05)
     os.killpg(run.process.pid, signal.SIGINT)

@@ -310,7 +310,7 @@ def test_size_that_does_not_fit_is_refused_with_the_figures(photo, run, tmp_path
 @pytest.mark.parametrize("error, code, words", [
     (MemoryError(), 1, "--size"),
     (RuntimeError("odd\nlines"), 1, "RuntimeError: odd lines"),
-    (ModuleNotFoundError("No module named 'x'"), 3, "No module named"),
+    (ModuleNotFoundError("No module named 'x'"), 2, "No module named"),
     (ValueError("tail\x1b[31m red"), 2, "\\x1b[31m"),
 ], ids=repr)  # fmt: skip
 def test_any_error_is_one_line(photo, run, tmp_path, monkeypatch, error, code, words):

@@ -10,15 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from crayonize.crayons.palette import (
-    DEFAULT_PALETTE,
-    MAX_CRAYONS,
-    Crayon,
-    Palette,
-    default_hiding,
-    load_palette,
-    palette_names,
-)
+from crayonize.crayons.palette import Crayon, Palette
+from crayonize.crayons.palette_files import MAX_CRAYONS, load_palette, palette_names
+from crayonize.crayons.pigment import default_hiding
 from stroke_gen.checks import did_you_mean, quoted
 
 DATA = Path(load_palette.__code__.co_filename).parents[1] / "data" / "palettes"
@@ -60,7 +54,7 @@ def shown(crayon: Crayon, thickness_um: float, ground: float) -> list[float]:
     return [0.0325 + 0.9675 * value for value in over(crayon, thickness_um, ground)]
 
 
-# ---- shipped palettes ------------------------------------------------------------------------------------
+# ---- shipped palettes ----------------------------------------------------------------------------
 
 
 def test_listing_names_every_file_with_title_and_size() -> None:
@@ -77,14 +71,17 @@ def test_every_crayon_is_sound_wax_with_a_plain_name(name: str) -> None:
     assert len({crayon.name for crayon in palette.crayons}) == len(palette.crayons)
     for crayon in palette.crayons:
         assert crayon.name == crayon.name.lower().strip()
-        assert not [brand for brand in BRANDS.replace("\n", " ").split(", ") if brand in crayon.name]
+        assert not [
+            brand for brand in BRANDS.replace("\n", " ").split(", ") if brand in crayon.name
+        ]
         assert all(math.isfinite(v) and v >= 0 for v in crayon.k + crayon.s)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_reference_film_on_white_shows_the_hex(name: str) -> None:
     palette = load_palette(name)
-    darkest = 255 * encoded(0.0325 + 0.9675 * 0.005)  # less than the front surface reflects no wax can show
+    # less than the front surface reflects no wax can show
+    darkest = 255 * encoded(0.0325 + 0.9675 * 0.005)
     for crayon in palette.crayons:
         seen = [255 * encoded(v) for v in shown(crayon, palette.film_um, 1.0)]
         wanted = [max(255 * v, darkest) for v in channels(crayon.hex)]
@@ -94,18 +91,26 @@ def test_reference_film_on_white_shows_the_hex(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "rudolf2003"])
 def test_reference_film_on_black_shows_the_hiding_or_more(name: str) -> None:
     palette = load_palette(name)
-    given = {one["name"]: one["hiding"] for one in json.loads((DATA / f"{name}.json").read_text())["crayons"]}
+    given = {
+        one["name"]: one["hiding"]
+        for one in json.loads((DATA / f"{name}.json").read_text())["crayons"]
+    }
     for crayon in palette.crayons:
         white, black = over(crayon, palette.film_um, 1.0), over(crayon, palette.film_um, 0.0)
         hides, least = [b / w for w, b in zip(white, black, strict=True)], given[crayon.name]
         assert all(least < hiding < least + 0.5 * (1 - least) for hiding in hides)
         clear = [hiding for hiding, w in zip(hides, white, strict=True) if w < 0.01]
-        assert clear == pytest.approx([least] * len(clear), abs=0.03)  # a dark channel stays as clear as it was
+        # a dark channel stays as clear as it was
+        assert clear == pytest.approx([least] * len(clear), abs=0.03)
 
 
-@pytest.mark.parametrize("name, dominant", [("red", 0), ("orange", 0), ("yellow", 0), ("green", 1), ("blue", 2)])
+@pytest.mark.parametrize(
+    "name, dominant", [("red", 0), ("orange", 0), ("yellow", 0), ("green", 1), ("blue", 2)]
+)
 def test_thick_wax_keeps_its_colour(name: str, dominant: int) -> None:
-    """Scans of heavy red keep .75 to .8 of the paper's red light; hiding alike in all channels left .38 at 80 um."""
+    """Scans of heavy red keep .75 to .8 of the paper's red light; hiding alike in all channels left
+    .38 at 80 um.
+    """
     palette = load_palette("box24")
     crayon = palette.crayons[palette.index(name)]
     thin, thick, endless = (shown(crayon, um, 1.0) for um in (palette.film_um, 45.0, 2000.0))
@@ -141,7 +146,7 @@ def test_split_film_looks_like_one_film(split: int) -> None:
 
 
 def test_default_box_can_draw_a_photo() -> None:
-    palette = load_palette(DEFAULT_PALETTE)
+    palette = load_palette("box24")
     needed = (
         "black,white,light grey,grey,dark brown,tan,peach,dark blue,blue green,sky blue,dark green,"
         "yellow green,red,dark red,orange,yellow,violet,pink"
@@ -181,13 +186,14 @@ def test_table_2_layer_has_its_transmittance_and_reflectance() -> None:
 
 def test_listing_and_loading_need_no_numpy() -> None:
     code = (
-        "import sys; from crayonize.crayons.palette import palette_names, load_palette; palette_names();"
+        "import sys; from crayonize.crayons.palette_files import palette_names, load_palette; "
+        "palette_names();"
         "load_palette('box24'); sys.exit(bool({'numpy', 'numba', 'cv2'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-# ---- users' palettes -------------------------------------------------------------------------------------
+# ---- users' palettes -----------------------------------------------------------------------------
 
 
 def write(folder: Path, name: str, content: str | bytes) -> Path:
@@ -216,7 +222,11 @@ def test_gimp_palette(tmp_path: Path) -> None:
     text = head + "255   0 10\tCherry\r\n  0 128 0 Pear skin\r\n1 2 3\tUntitled\r\n"
     palette = load_palette(str(write(tmp_path, "fruit.GPL", text)))
     assert (palette.name, palette.title) == ("fruit", "Fruit")
-    assert summary(palette) == [("cherry", "#ff000a"), ("pear skin", "#008000"), ("#010203", "#010203")]
+    assert summary(palette) == [
+        ("cherry", "#ff000a"),
+        ("pear skin", "#008000"),
+        ("#010203", "#010203"),
+    ]
 
 
 @pytest.mark.parametrize("ending", ["txt", "hex"])
@@ -227,7 +237,10 @@ def test_list_of_hex_colours(tmp_path: Path, ending: str) -> None:
 
 
 def test_comma_list() -> None:
-    assert summary(load_palette("#ff0000,#00FF00 grass")) == [("#ff0000", "#ff0000"), ("grass", "#00ff00")]
+    assert summary(load_palette("#ff0000,#00FF00 grass")) == [
+        ("#ff0000", "#ff0000"),
+        ("grass", "#00ff00"),
+    ]
 
 
 def test_most_crayons_allowed() -> None:
@@ -251,7 +264,7 @@ def test_extreme_colours_are_still_wax(colour: str, hiding: float) -> None:
     assert all(0 < v < 1 for v in over(crayon, 9.0, 1.0))
 
 
-# ---- what is wrong, and what would be right --------------------------------------------------------------
+# ---- what is wrong, and what would be right ------------------------------------------------------
 
 ONE = '{"crayons": [%s]}'
 GIMP = "GIMP Palette\n"
@@ -268,30 +281,81 @@ BAD_FILES = [
     ("a.json", ONE % ", ".join(["{}"] * 255), "a.json: 255 crayons, a palette has 1 to 254"),
     ("a.json", ONE % '"red"', 'a.json: crayons[0]: "red" is not an object'),
     ("a.json", ONE % '{"name": "red"}', 'crayons[0]: "hex" is missing'),
-    ("a.json", ONE % '{"hex": "#ff0000"}, {"hex": "#12345"}', 'crayons[1].hex: "#12345" is not #rrggbb'),
+    (
+        "a.json",
+        ONE % '{"hex": "#ff0000"}, {"hex": "#12345"}',
+        'crayons[1].hex: "#12345" is not #rrggbb',
+    ),
     ("a.json", ONE % '{"hex": 255}', "crayons[0].hex: 255 is not #rrggbb"),
-    ("a.json", ONE % '{"hex": "#ff0000", "hidding": 1}', 'unknown key "hidding" (did you mean "hiding"?)'),
-    ("a.json", ONE % '{"hex": "#ff0000", "hiding": 1.5}', "crayons[0].hiding: 1.5 is not a number from 0.01"),
+    (
+        "a.json",
+        ONE % '{"hex": "#ff0000", "hidding": 1}',
+        'unknown key "hidding" (did you mean "hiding"?)',
+    ),
+    (
+        "a.json",
+        ONE % '{"hex": "#ff0000", "hiding": 1.5}',
+        "crayons[0].hiding: 1.5 is not a number from 0.01",
+    ),
     ("a.json", ONE % '{"hex": "#ff0000", "hiding": NaN}', "crayons[0].hiding: nan is not a number"),
-    ("a.json", ONE % '{"hex": "#ff0000", "hiding": true}', "crayons[0].hiding: true is not a number"),
-    ("a.json", ONE % ('{"hex": "#ff0000", "hiding": 1' + "0" * 400 + "}"), "hiding: a huge number is not"),
+    (
+        "a.json",
+        ONE % '{"hex": "#ff0000", "hiding": true}',
+        "crayons[0].hiding: true is not a number",
+    ),
+    (
+        "a.json",
+        ONE % ('{"hex": "#ff0000", "hiding": 1' + "0" * 400 + "}"),
+        "hiding: a huge number is not",
+    ),
     ("a.json", ONE % '{"hex": "#ff0000", "name": ""}', "crayons[0].name: the name is empty"),
-    ("a.json", ONE % '{"hex": "#ff0000", "name": "a\\nb"}', '"a\\nb" is not text of at most 60 printable'),
+    (
+        "a.json",
+        ONE % '{"hex": "#ff0000", "name": "a\\nb"}',
+        '"a\\nb" is not text of at most 60 printable',
+    ),
     ("a.json", ONE % '{"hex": "#ff0000", "name": "\\ud800"}', '"\\ud800" is not text'),
-    ("a.json", ONE % '{"hex": "#ff0000", "name": "Red"}, {"hex": "#fe0000", "name": "red"}',
-     'crayons[1].name: a second crayon "red"'),
-    ("a.json", '{"film_um": 0, "crayons": [{"hex": "#ff0000"}]}', "film_um: 0 is not a number from 0.1"),
+    (
+        "a.json",
+        ONE % '{"hex": "#ff0000", "name": "Red"}, {"hex": "#fe0000", "name": "red"}',
+        'crayons[1].name: a second crayon "red"',
+    ),
+    (
+        "a.json",
+        '{"film_um": 0, "crayons": [{"hex": "#ff0000"}]}',
+        "film_um: 0 is not a number from 0.1",
+    ),
     ("a.json", '{"film_um": "9", "crayons": [{"hex": "#ff0000"}]}', 'film_um: "9" is not a number'),
-    ("a.json", '{"film_um": true, "crayons": [{"hex": "#ff0000"}]}', "film_um: true is not a number"),
-    ("a.json", '{"layer_films": 11, "crayons": [{}]}', "layer_films: 11 is not a number from 0.1 to 10"),
-    ("a.json", ONE % '{"name": "red", "rgb": [1, 0], "t": 0.5, "s": 0.1}', "rgb: a list of 2 is not a list"),
-    ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 2], "t": 0.5, "s": 0.1}', "rgb[2]: 2 is not a number"),
+    (
+        "a.json",
+        '{"film_um": true, "crayons": [{"hex": "#ff0000"}]}',
+        "film_um: true is not a number",
+    ),
+    (
+        "a.json",
+        '{"layer_films": 11, "crayons": [{}]}',
+        "layer_films: 11 is not a number from 0.1 to 10",
+    ),
+    (
+        "a.json",
+        ONE % '{"name": "red", "rgb": [1, 0], "t": 0.5, "s": 0.1}',
+        "rgb: a list of 2 is not a list",
+    ),
+    (
+        "a.json",
+        ONE % '{"name": "red", "rgb": [1, 0, 2], "t": 0.5, "s": 0.1}',
+        "rgb[2]: 2 is not a number",
+    ),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 0], "t": 0.5}', 'crayons[0]: "s" is missing'),
     ("a.json", ONE % '{"name": "red", "rgb": [1, 0, 0], "t": 0.5, "s": 0.6}', "t + s = 1.1"),
     ("a.json", " " * 1_000_001, "a.json: larger than 1 MB"),
     ("a.gpl", "Palette\n1 2 3\n", 'a.gpl: line 1: a .gpl file begins with "GIMP Palette"'),
     ("a.gpl", GIMP + "# none\n", "a.gpl: 0 crayons"),
-    ("a.gpl", GIMP + "1 2 3 a\n1 2 300 b\n", 'a.gpl: line 3: "1 2 300 b" does not begin with three numbers'),
+    (
+        "a.gpl",
+        GIMP + "1 2 3 a\n1 2 300 b\n",
+        'a.gpl: line 3: "1 2 300 b" does not begin with three numbers',
+    ),
     ("a.gpl", GIMP + "1 2\n", "a.gpl: line 2"),
     ("a.gpl", GIMP + "1 2 3 a\n\n4 5 6 A\n", 'a.gpl: line 4: a second crayon "a"'),
     ("a.gpl", b"GIMP Palette\n1 2 3 gr\xfcn\n", "a.gpl: line 2: not UTF-8"),
@@ -300,17 +364,23 @@ BAD_FILES = [
     ("a.hex", "ff0000\n" * 2, 'a.hex: line 2: a second crayon "#ff0000"'),
     ("a.txt", "".join(f"{i:06x}\n" for i in range(255)), "a.txt: 255 crayons"),
     ("a.png", "x", "a.png: a palette file ends in .json, .gpl, .txt or .hex"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "content", "part"), BAD_FILES)
-def test_bad_file_gets_one_clear_line(tmp_path: Path, name: str, content: str | bytes, part: str) -> None:
+def test_bad_file_gets_one_clear_line(
+    tmp_path: Path, name: str, content: str | bytes, part: str
+) -> None:
     path = write(tmp_path, name, content)
     with pytest.raises(ValueError) as caught:
         load_palette(path)
     message = str(caught.value)
     assert part in message
-    assert message.startswith(str(path)) and message.isprintable() and len(message) < len(str(path)) + 200
+    assert (
+        message.startswith(str(path))
+        and message.isprintable()
+        and len(message) < len(str(path)) + 200
+    )
 
 
 @pytest.mark.parametrize(
@@ -340,7 +410,9 @@ def test_pipe_is_refused_at_once(tmp_path: Path) -> None:
 
 
 def test_unknown_crayon_names_the_nearest() -> None:
-    with pytest.raises(ValueError, match=r'palette box24: no crayon "dark gren" \(did you mean "dark green"'):
+    with pytest.raises(
+        ValueError, match=r'palette box24: no crayon "dark gren" \(did you mean "dark green"'
+    ):
         load_palette("box24").index("dark gren")
     with pytest.raises(ValueError, match=r"no crayon \"xyzzy\" \(valid: red, orange"):
         load_palette("box8").index("xyzzy")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from crayonize import pipeline
-from crayonize.crayons.palette import load_palette
+from crayonize.crayons.palette_files import load_palette
 from crayonize.images.icc import encode_srgb
 from crayonize.pages import legend
 from crayonize.pages.legend import used_crayons, with_legend

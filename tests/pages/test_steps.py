@@ -7,9 +7,10 @@ import pytest
 from PIL import Image
 
 from crayonize import cli
-from crayonize.crayons.palette import load_palette
-from crayonize.pages import steps
-from crayonize.pages.steps import outline_of, save_steps, steps_of
+from crayonize.crayons.palette_files import load_palette
+from crayonize.pages import layout
+from crayonize.pages.outline import outline_of
+from crayonize.pages.steps import save_steps, steps_of
 from stroke_gen.drawing import Drawing, Stroke, Tip
 
 WIDTH, HEIGHT = 200.0, 120.0
@@ -20,7 +21,7 @@ PAGE = (round(297 * DPI / 25.4), round(210 * DPI / 25.4))
 @pytest.fixture(scope="module", autouse=True)
 def small_pages():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(steps, "DPI", DPI)
+        patch.setattr(layout, "DPI", DPI)
         yield
 
 
@@ -93,10 +94,10 @@ def test_pages_are_a4_and_numbered(pages):
 
 def place(x_mm, y_mm):
     """The pixels of a page around a place of the drawing."""
-    room = (297 - 2 * steps.MARGIN_MM, 210 - steps.HEAD_MM - steps.FOOT_MM - steps.MARGIN_MM)
+    room = (297 - 2 * layout.MARGIN_MM, 210 - layout.HEAD_MM - layout.FOOT_MM - layout.MARGIN_MM)
     scale = min(room[0] / 100, room[1] / 60)
     x = (297 - 100 * scale) / 2 + x_mm * scale
-    y = steps.HEAD_MM + y_mm * scale
+    y = layout.HEAD_MM + y_mm * scale
     dot = DPI / 25.4
     return np.s_[
         round((y - 4) * dot) : round((y + 4) * dot), round((x - 4) * dot) : round((x + 4) * dot)

@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from crayonize.crayons.palette import load_palette
+from crayonize.crayons.palette_files import load_palette
 from crayonize.images.read import read_linear
 from crayonize.pipeline import Easel, draw
 from stroke_gen.drawing_file import load_drawing

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_box import COLOURS, box
+from stroke_gen.recipes import Recipes, clash, find, nearest
 
 from stroke_gen import recipes
 from stroke_gen.colour import oklab
-from stroke_gen.recipes import Recipes, clash, find, nearest
 
 TABLE = box()
 NAMES = TABLE.names

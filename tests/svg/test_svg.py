@@ -9,7 +9,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from crayonize.crayons.palette import load_palette
+from crayonize.crayons.palette_files import load_palette
 from crayonize.crayons.used import by_crayon
 from crayonize.images.srgb import luminance
 from crayonize.svg import path as svg_path

@@ -6,8 +6,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from PIL.Image import Exif
-
 from .. import api
 from ..images import metadata, page
 from ..images.read import Photo, open_photo
@@ -80,7 +78,7 @@ class Studio:
 
     def _draw(self, job: Job, source: str, target: Path, ask: Ask) -> Outcome:
         with open_photo(source) as photo:
-            settings, kept, needed = self._look_at(photo)
+            settings, needed = self._look_at(photo)
             if not ask(needed):
                 raise ValueError(
                     f"needs about {needed / 1e9:.1f} GB of memory, more than there is; reduce it "
@@ -95,6 +93,7 @@ class Studio:
                     f"at {job.out!r} stands something that was not made here; see --existing"
                 )
             drawing, easel = self._sketch(photo, settings)
+            kept = metadata.kept(photo.exif, self._recipe.metadata)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             api.finish(
@@ -106,9 +105,8 @@ class Studio:
             raise OutputError(f"{error.filename or job.out}: {error.strerror or error}") from error
         return Outcome("ok", bytes=target.stat().st_size, strokes=len(drawing.strokes))
 
-    def _look_at(self, photo: Photo) -> tuple[Settings, Exif | None, int]:
-        """Settings for this photo, tags to keep, and bytes of memory it will take, all by its
-        header alone.
+    def _look_at(self, photo: Photo) -> tuple[Settings, int]:
+        """Settings for this photo, and bytes of memory it will take, by its header alone.
 
         ValueError for a photo beyond the limits.
         """
@@ -118,8 +116,7 @@ class Studio:
                 f"has {pixels} pixels; the limit is {recipe.max_pixels} (--max-pixels)"
             )
         settings = page.fitted(recipe.settings, recipe.page, recipe.dpi, photo.width, photo.height)
-        kept = metadata.kept(photo.picture, recipe.metadata)
-        return settings, kept, memory.need(photo.decoding, settings.size, settings.preview)
+        return settings, memory.need(photo.decoding, settings.size, settings.preview)
 
 
 def _is_ours(path: Path) -> bool:

@@ -204,7 +204,7 @@ def child(part: str, *given: Any, **environment: str) -> Any:
 
 
 class _Clock:
-    """Where the time from photo to picture goes; looks on (pipeline.Watch) to know one stage from
+    """Where the time from photo to picture goes; looks on (pipeline.Onlooker) to know one stage from
     the next.
     """
 

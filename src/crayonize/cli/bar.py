@@ -14,8 +14,7 @@ from stroke_gen.checks import printable
 from ..machine.terminal import Bar
 
 if TYPE_CHECKING:
-    from ..api import Progress
-    from ..pipeline import Easel
+    from ..pipeline import Easel, Progress
 
 
 @contextmanager

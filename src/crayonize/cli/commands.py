@@ -48,11 +48,11 @@ def convert(words: Sequence[str]) -> int:
 
     with talk(options) as progress, open_photo(photo) as opened:
         settings = page.fitted(settings, options.print, options.dpi, opened.width, opened.height)
-        kept = metadata.kept(opened.picture, options.metadata)
         with api.filming(
             options.timelapse, options.seconds, options.show_tip, options.light
         ) as watch:
             drawing, easel = api.sketch(opened, settings, progress, watch)
+        kept = metadata.kept(opened.exif, options.metadata)
         api.finish(
             drawing,
             easel,
@@ -197,7 +197,7 @@ def _palettes(words: Sequence[str]) -> int:
     Parser(prog="crayonize palettes", description="List the boxes of crayons, for --palette.").read(
         words
     )
-    from ..crayons.palette import palette_names
+    from ..crayons.palette_files import palette_names
 
     return _list((name, f"{number:3} crayons  {title}") for name, title, number in palette_names())
 

@@ -1,1 +1,3 @@
-"""The crayons: palettes, the pigment of each crayon, and what a crayon gives as measured on the wax."""
+"""The crayons: palettes, the pigment of each crayon, and what a crayon gives as measured on the
+wax.
+"""

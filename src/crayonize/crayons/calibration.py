@@ -24,7 +24,8 @@ from ..wax import paper, rub
 from ..wax.box import Box
 from ..wax.physics import physics as physics_of
 from ..wax.sheet import Sheet
-from .palette import Palette, load_palette, palette_names
+from .palette import Palette
+from .palette_files import load_palette, palette_names
 
 PRESSURES = (0.04, 0.1, 0.2, 0.38, 0.62, 0.95)  # N/mm^2
 TIP = Tip("blunt", TIP_MM)

@@ -1,51 +1,19 @@
-"""The box of crayons: the shipped palettes, a user's own palette, and what a crayon's colour means as wax.
+"""The box of crayons: each with its name, its colour and its wax.
 
-A crayon is given by the colour it shows on white paper under a film of reference thickness (`film_um`) and
-by its hiding: the share of that colour it still shows on black. Those two colours fix its Kubelka-Munk
-absorption k and scattering s per micrometre (Curtis et al. 1997, "Computer-generated watercolor"). The
-crayons of the 2003 wax-crayon paper come as in its Table 2 instead: a colour, and the transmittance t and
-reflectance s of a layer that is `layer_films` such films thick.
-
-No numpy here: the command line lists palettes without waiting for it.
+How they are read: palette_files.py.
 """
 
-import json
-import math
-import os
-import re
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
-from stroke_gen import checks, files
-from stroke_gen.checks import did_you_mean, of_kind, printable, quoted, shown
+from stroke_gen.checks import did_you_mean, quoted
 
-from ..images.srgb import RGB, hex_of, is_hex, light_of, to_light
-
-DEFAULT_PALETTE = "box24"
-MAX_CRAYONS = 254
-MAX_FILE_BYTES = 1_000_000
-
-_DATA = Path(__file__).parents[1] / "data" / "palettes"
-_DEFAULT_FILM_UM = 15.0
-_MAX_NAME = 60
-
-FRONT = ((1.44 - 1) / (1.44 + 1)) ** 2  # of the light that meets wax its surface reflects (Fresnel; n of paraffin 1.44)
-_CLEAN = 0.5  # how much better than its hiding a crayon hides in a channel of reflectance 1/2
-
-# A crayon is never perfectly black or white in any channel; the inversion needs colours strictly between.
-_DARKEST, _LIGHTEST = 0.005, 0.985
-
-_PALETTE_KEYS = ("name", "title", "source", "film_um", "layer_films", "crayons")
-_COLOUR_KEYS = ("name", "hex", "hiding")
-_LAYER_KEYS = ("name", "rgb", "t", "s", "table2")
-
+from ..images.srgb import RGB
 
 
 @dataclass(frozen=True)
 class Crayon:
-    """One crayon: its name, its colour on white paper (#rrggbb, film of reference thickness) and its wax.
+    """One crayon: its name, its colour on white paper (#rrggbb, film of reference thickness) and
+    its wax.
 
     k, s: Kubelka-Munk absorption and scattering per micrometre of wax, for linear R, G, B.
     """
@@ -67,301 +35,19 @@ class Palette:
     crayons: tuple[Crayon, ...]
 
     def index(self, name: str) -> int:
-        """The place of a crayon in the box. ValueError with the nearest names if it is not there."""
-        wanted = _plain(name)
+        """The place of a crayon in the box.
+
+        ValueError with the nearest names if it is not there.
+        """
+        wanted = plain(name)
         names = [crayon.name for crayon in self.crayons]
         if wanted not in names:
-            raise ValueError(f"palette {self.name}: no crayon {quoted(name)}{did_you_mean(wanted, names)}")
+            raise ValueError(
+                f"palette {self.name}: no crayon {quoted(name)}{did_you_mean(wanted, names)}"
+            )
         return names.index(wanted)
 
 
-def palette_names() -> list[tuple[str, str, int]]:
-    """The shipped palettes as (name, title, number of crayons), in order of name and number."""
-    listed = []
-    for name in _shipped():
-        data = json.loads((_DATA / f"{name}.json").read_text(encoding="utf-8"))
-        listed.append((name, str(data["title"]), len(data["crayons"])))
-    return listed
-
-
-def load_palette(source: "str | os.PathLike[str] | dict[str, Any] | Palette") -> Palette:
-    """A palette by the name of a shipped one, from a user's file, from a list of colours or from an object.
-
-    source: a shipped name ("box24"); a path ending in .json (the format of the shipped ones), .gpl (GIMP),
-    .txt or .hex (one #rrggbb a line, a name after it if you like, comments begin with "# "); a comma list
-    "#ff0000,#00ff00 grass"; the content of a palette .json as a dict; a Palette, handed back as it is.
-
-    Crayon names are put in lower case with single spaces; a colour without a name is called by its #rrggbb.
-    A colour without hiding gets one from its lightness and chroma, see `default_hiding`. As no wax is
-    perfectly black or white, its linear channels are kept within 0.005 to 0.985 (about #101010 to #fdfdfd).
-
-    ValueError, one line, naming the file and the line or JSON path, what is wrong and what would be right.
-    """
-    if isinstance(source, Palette):
-        return source
-    if isinstance(source, dict):
-        return _from_object(source, "palette", "custom")
-    if isinstance(source, os.PathLike):
-        return _from_file(Path(source), printable(os.fspath(source)))
-    text = of_kind(str, source, "palette", "a name, a file, a list of colours or an object")
-    if text in _shipped():
-        return _from_file(_DATA / f"{text}.json", text)
-    if text.lstrip().startswith("#"):
-        return _from_comma_list(text)
-    return _from_file(Path(text), printable(text))
-
-
-def default_hiding(colour: str) -> float:
-    """The hiding of a colour nobody has measured: pale and grey wax hides, vivid wax is clear.
-
-    0.36 + 0.34 L/100 - 0.0045 C, kept within 0.12 to 0.70, with CIELab lightness L and chroma C (D65) of
-    `colour` (#rrggbb): white 0.70, mid grey 0.54, pastels about 0.5, vivid red and blue under 0.2.
-    """
-    lightness, chroma = _lightness_chroma(light_of(colour))
-    return min(0.70, max(0.12, 0.36 + 0.34 * lightness / 100 - 0.0045 * chroma))
-
-
-# ---- reading ---------------------------------------------------------------------------------------------
-
-
-def _shipped() -> list[str]:
-    def by_number(name: str) -> tuple[str, int]:
-        word = name.rstrip("0123456789")
-        return word, int(name[len(word) :] or 0)
-
-    return sorted((path.stem for path in _DATA.glob("*.json")), key=by_number)
-
-
-def _from_file(path: Path, where: str) -> Palette:
-    readers: dict[str, Callable[[str, str, str], Palette]] = {
-        ".json": _from_json_text,
-        ".gpl": _from_gimp_text,
-        ".txt": _from_hex_text,
-        ".hex": _from_hex_text,
-    }
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
-        if not path.exists():
-            near = did_you_mean(path.name, _shipped())
-            raise ValueError(f"palette {quoted(where, 200)}: neither a shipped palette nor a file{near}")
-        raise ValueError(f"{where}: a palette file ends in .json, .gpl, .txt or .hex")
-    return reader(_text_of(path, where), where, printable(path.stem))
-
-
-def _text_of(path: Path, where: str) -> str:
-    try:
-        raw = files.read_bytes(path, MAX_FILE_BYTES, "a palette file")
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from error
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise ValueError(f"{where}: line {line}: not UTF-8 text") from error
-
-
-def _from_json_text(text: str, where: str, stem: str) -> Palette:
-    data = of_kind(dict, checks.parsed_json(text, where, "palette"), where, 'an object like {"crayons": [...]}')
-    return _from_object(data, where, stem)
-
-
-def _from_object(data: dict[str, Any], where: str, stem: str) -> Palette:
-    checks.keys(data, _PALETTE_KEYS, where)
-    crayons = of_kind(list, data.get("crayons"), f"{where}: crayons", 'a list like [{"hex": "#ff0000"}]')
-    _check_count(len(crayons), where)
-    film_um = checks.number(data.get("film_um", _DEFAULT_FILM_UM), 0.1, 200.0, f"{where}: film_um")
-    layer_um = film_um * checks.number(data.get("layer_films", 1.0), 0.1, 10.0, f"{where}: layer_films")
-    name = checks.text(data["name"], _MAX_NAME, f"{where}: name") if "name" in data else stem
-    made = [_crayon(one, film_um, layer_um, f"{where}: crayons[{i}]") for i, one in enumerate(crayons)]
-    places = [f"{where}: crayons[{i}].name" for i in range(len(made))]
-    return Palette(
-        name=name,
-        title=checks.text(data["title"], _MAX_NAME, f"{where}: title") if "title" in data else name,
-        source=checks.text(data.get("source", ""), 1000, f"{where}: source"),
-        film_um=film_um,
-        crayons=_all_different(made, places),
-    )
-
-
-def _crayon(given: Any, film_um: float, layer_um: float, where: str) -> Crayon:
-    data = of_kind(dict, given, where, 'an object like {"name": "red", "hex": "#ff0000"}')
-    by_layer = "hex" not in data and "rgb" in data
-    checks.keys(data, _LAYER_KEYS if by_layer else _COLOUR_KEYS, where)
-    if by_layer:
-        return _layer_crayon(data, film_um, layer_um, where)
-    if "hex" not in data:
-        raise ValueError(f'{where}: "hex" is missing, give the colour as "#rrggbb"')
-    colour = _colour(data["hex"], f"{where}.hex")
-    name = _crayon_name(data.get("name", colour), f"{where}.name")
-    if "hiding" not in data:
-        return _colour_crayon(name, colour, default_hiding(colour), film_um)
-    return _colour_crayon(name, colour, checks.number(data["hiding"], 0.01, 0.99, f"{where}.hiding"), film_um)
-
-
-def _layer_crayon(data: dict[str, Any], film_um: float, layer_um: float, where: str) -> Crayon:
-    """A crayon as in the 2003 paper: sRGB colour rgb (0..1), transmittance t and reflectance s of a layer."""
-    for key in ("name", "t", "s"):
-        if key not in data:
-            raise ValueError(f"{where}: {quoted(key)} is missing, a crayon with rgb needs name, t and s")
-    rgb = data["rgb"]
-    if not isinstance(rgb, list) or len(rgb) != 3:
-        raise ValueError(f"{where}.rgb: {shown(rgb)} is not a list of three numbers from 0 to 1")
-    colour = [checks.number(value, 0.0, 1.0, f"{where}.rgb[{i}]") for i, value in enumerate(rgb)]
-    t = checks.number(data["t"], 0.001, 0.999, f"{where}.t")
-    s = checks.number(data["s"], 0.001, 0.999, f"{where}.s")
-    if t + s >= 1:
-        raise ValueError(
-            f"{where}: t + s = {t + s:g}, a layer cannot send out more light than it gets (below 1)"
-        )
-    tints = [max(_DARKEST, to_light(value)) for value in colour]
-    k, sc = _per_um([(s * tint, t * tint) for tint in tints], layer_um)
-    over_white = [FRONT + (1 - FRONT) * _over_white(k[c] * film_um, sc[c] * film_um) for c in range(3)]
-    return Crayon(_crayon_name(data["name"], f"{where}.name"), hex_of(over_white), k, sc)
-
-
-def _from_gimp_text(text: str, where: str, stem: str) -> Palette:
-    """GIMP's palette text: `GIMP Palette`, `Name:`, `Columns:` and `#` lines, then `R G B name` lines."""
-    lines = text.splitlines()
-    if not lines or lines[0].strip() != "GIMP Palette":
-        raise ValueError(f'{where}: line 1: a .gpl file begins with "GIMP Palette"')
-    title, found = stem, []
-    for number, line in enumerate(lines[1:], start=2):
-        line = line.strip()
-        if line.startswith("Name:"):
-            title = checks.text(line.removeprefix("Name:").strip(), _MAX_NAME, f"{where}: line {number}") or stem
-        elif line and not line.startswith(("#", "Columns:")):
-            found.append((f"{where}: line {number}", *_gimp_colour(line, f"{where}: line {number}")))
-    return _from_colours(found, where, stem, title)
-
-
-def _gimp_colour(line: str, where: str) -> tuple[str, str]:
-    words = line.split(maxsplit=3)
-    if len(words) < 3 or not all(re.fullmatch("[0-9]{1,3}", word) and int(word) <= 255 for word in words[:3]):
-        raise ValueError(f"{where}: {quoted(line)} does not begin with three numbers from 0 to 255")
-    name = words[3] if len(words) == 4 and words[3].strip().lower() != "untitled" else ""
-    return "#{:02x}{:02x}{:02x}".format(*map(int, words[:3])), name
-
-
-def _from_hex_text(text: str, where: str, stem: str) -> Palette:
-    found = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        line = line.strip()
-        if line and line != "#" and not line.startswith(("# ", "#\t", "##")):
-            found.append((f"{where}: line {number}", *_hex_item(line, f"{where}: line {number}")))
-    return _from_colours(found, where, stem, stem)
-
-
-def _from_comma_list(text: str) -> Palette:
-    where = "palette list"
-    items = [item.strip() for item in text.split(",")]
-    _check_count(len(items), where)
-    found = [
-        (f"{where}: item {i}", *_hex_item(item, f"{where}: item {i}")) for i, item in enumerate(items, 1)
-    ]
-    return _from_colours(found, where, "custom", "list of colours")
-
-
-def _hex_item(text: str, where: str) -> tuple[str, str]:
-    """`#rrggbb`, a name after it if any, and a comment after that (` # ...`); the first # may be left out."""
-    words = text.split(" #", 1)[0].split(maxsplit=1)
-    word = words[0] if words else ""
-    if not is_hex(word):
-        raise ValueError(f'{where}: {quoted(word)} is not #rrggbb (a comment begins with "# ")')
-    return "#" + word[-6:], words[1] if len(words) == 2 else ""
-
-
-def _from_colours(found: Sequence[tuple[str, str, str]], where: str, stem: str, title: str) -> Palette:
-    """A palette of bare colours: (where it stands, #rrggbb, name or "") each."""
-    _check_count(len(found), where)
-    crayons = []
-    for place, given, name in found:
-        colour = given.lower()
-        named = _crayon_name(name or colour, place)
-        crayons.append(_colour_crayon(named, colour, default_hiding(colour), _DEFAULT_FILM_UM))
-    made = _all_different(crayons, [place for place, _, _ in found])
-    return Palette(stem, title, f"colours of {where}", _DEFAULT_FILM_UM, made)
-
-
-# ---- checks ----------------------------------------------------------------------------------------------
-
-
-def _check_count(count: int, where: str) -> None:
-    if not 1 <= count <= MAX_CRAYONS:
-        raise ValueError(f"{where}: {count} crayons, a palette has 1 to {MAX_CRAYONS}")
-
-
-def _all_different(crayons: Sequence[Crayon], places: Sequence[str]) -> tuple[Crayon, ...]:
-    seen: set[str] = set()
-    for crayon, place in zip(crayons, places, strict=True):
-        if crayon.name in seen:
-            raise ValueError(f"{place}: a second crayon {quoted(crayon.name)}, give each its own name")
-        seen.add(crayon.name)
-    return tuple(crayons)
-
-
-def _colour(value: Any, where: str) -> str:
-    if not isinstance(value, str) or not value.startswith("#") or not is_hex(value):
-        raise ValueError(f"{where}: {shown(value)} is not #rrggbb")
-    return value.lower()
-
-
-def _crayon_name(value: Any, where: str) -> str:
-    name = _plain(checks.text(value, _MAX_NAME, where))
-    if not name:
-        raise ValueError(f'{where}: the name is empty, give one like "red"')
-    return name
-
-
-def _plain(name: str) -> str:
+def plain(name: str) -> str:
+    """A crayon's name in lower case with single spaces."""
     return " ".join(name.split()).lower()
-
-
-# ---- colour and wax --------------------------------------------------------------------------------------
-
-
-def _colour_crayon(name: str, colour: str, hiding: float, film_um: float) -> Crayon:
-    """A crayon from its colour over white, Rw, and black, Rb: R = Rb, T^2 = (Rw - Rb)(1 - Rb).
-
-    What its front surface reflects is taken off the colour. Rb is `hiding` Rw, and more in channels half bright:
-    there thick wax of even hiding would be much darker than its hex, and heavy red brown, which it is not.
-    """
-    layers = []
-    for value in light_of(colour):
-        white = min(_LIGHTEST, max(_DARKEST, (value - FRONT) / (1 - FRONT)))
-        black = white * (hiding + (1 - hiding) * _CLEAN * (1 - (1 - white) ** 6) * (1 - white**2 / 2))
-        layers.append((black, math.sqrt((white - black) * (1 - black))))
-    k, s = _per_um(layers, film_um)
-    return Crayon(name, colour, k, s)
-
-
-def _per_um(layers: Sequence[tuple[float, float]], thickness_um: float) -> tuple[RGB, RGB]:
-    """(k, s) per micrometre of three channels, each given as (reflectance, transmittance) of one layer."""
-    pairs = [_absorption_scattering(r, t) for r, t in layers]
-    k, s = ([value / thickness_um for value in column] for column in zip(*pairs, strict=True))
-    return (k[0], k[1], k[2]), (s[0], s[1], s[2])
-
-
-def _absorption_scattering(r: float, t: float) -> tuple[float, float]:
-    """(K h, S h) of the layer that reflects r and transmits t, r + t < 1: Kubelka (1948) solved for them."""
-    a_less_1 = (1 - r - t) * (1 - r + t) / (2 * r)
-    b = math.sqrt(a_less_1 * (a_less_1 + 2))
-    scattering = math.asinh(b * r / t) / b
-    return a_less_1 * scattering, scattering
-
-
-def _over_white(absorption: float, scattering: float) -> float:
-    """Reflectance of a layer (K h, S h) on a perfect white, Kubelka (1948); w = b coth(b S h)."""
-    a = 1 + absorption / scattering
-    b = math.sqrt(a * a - 1)
-    w = b / math.tanh(b * scattering)
-    return (1 - a + w) / (a - 1 + w)
-
-
-def _lightness_chroma(light: RGB) -> tuple[float, float]:
-    """CIELab lightness and chroma of linear sRGB light (D65 white)."""
-    r, g, b = light
-    x = (0.4124564 * r + 0.3575761 * g + 0.1804375 * b) / 0.95047
-    y = 0.2126729 * r + 0.7151522 * g + 0.0721750 * b
-    z = (0.0193339 * r + 0.1191920 * g + 0.9503041 * b) / 1.08883
-    fx, fy, fz = (v ** (1 / 3) if v > 216 / 24389 else (24389 / 27 * v + 16) / 116 for v in (x, y, z))
-    return 116 * fy - 16, math.hypot(500 * (fx - fy), 200 * (fy - fz))

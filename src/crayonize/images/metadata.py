@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from PIL.Image import Exif, Image
+    from PIL.Image import Exif
 
 CHOICES = ("none", "safe", "all")
 
@@ -47,19 +47,18 @@ _LAYOUT = frozenset(
 _LONGEST = 60_000  # bytes, as JPEG holds 64 kB
 
 
-def kept(picture: Image | None, which: str) -> Exif | None:
-    """The tags of an open photo that go along: none, safe (title, names, date; no place) or all of
+def kept(old: Exif | None, which: str) -> Exif | None:
+    """The tags of a photo that go along: none, safe (title, names, date; no place) or all of
     EXIF.
 
     None if there are none, or if they are too damaged or too many to be written.
     """
-    if which == "none" or picture is None:
+    if which == "none" or old is None:
         return None
     from PIL.Image import Exif
 
     new = Exif()
     try:
-        old = picture.getexif()
         inside, place = dict(old.get_ifd(_EXIF_FOLDER)), dict(old.get_ifd(_GPS_FOLDER))
         outside = dict(old)
         if (

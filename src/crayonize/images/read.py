@@ -8,7 +8,7 @@ import os
 import stat
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from typing import IO, Any
@@ -69,18 +69,18 @@ def read_linear(
 class Photo:
     """A photo whose header has been read, and whose light can be taken once.
 
-    width, height: pixels as stored.   decoding: bytes that taking the light needs beside the light
-        itself.
-    picture: its header as Pillow has it, None for an array.
+    width, height: pixels as stored.   decoding: bytes that taking the light needs beside the light.
+    exif: what it tells of itself, once its light has been taken; None for an array, or if broken.
     """
 
     source: Source
     width: int
     height: int
     decoding: int
-    picture: Image.Image | None
     _name: str
+    _picture: Image.Image | None
     _scan: Callable[[], Scan]
+    exif: Image.Exif | None = None
 
     def light(
         self, max_side: int | None = None, ground: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -88,8 +88,12 @@ class Photo:
         """Decode it, as `read_linear` says; the decoded pixels are given back at the end."""
         with _named(self._name):
             light = _light(self._scan(), max_side, ground)
-        if self.picture is not None and not isinstance(self.source, Image.Image):
-            self.picture.close()
+        if self._picture is not None:
+            # Not before it is decoded: Pillow decodes a PNG to look for them, and an error would be lost.
+            with suppress(Exception):  # broken EXIF raises nearly anything
+                self.exif = self._picture.getexif()
+            if not isinstance(self.source, Image.Image):
+                self._picture.close()
         return light
 
 
@@ -104,7 +108,7 @@ def open_photo(source: Source | Photo) -> Iterator[Photo]:
     elif isinstance(source, np.ndarray):
         with _named("array"):
             scan = scan_array(source)
-        yield Photo(source, scan.width, scan.height, 0, None, "array", lambda: scan)
+        yield Photo(source, scan.width, scan.height, 0, "array", None, lambda: scan)
     elif isinstance(source, Image.Image):
         with _named("picture"):
             check_size(source.width, source.height)
@@ -123,7 +127,7 @@ def _photo(source: Source, picture: Image.Image, name: str, file: IO[bytes] | No
     deep = ";16" in repr(getattr(picture, "tile", ""))
     decoding = memory.decoding(picture.format, picture.width * picture.height, deep)
     return Photo(
-        source, *picture.size, decoding, picture, name, lambda: scan_picture(picture, file)
+        source, *picture.size, decoding, name, picture, lambda: scan_picture(picture, file)
     )
 
 

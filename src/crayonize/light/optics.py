@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stroke_gen.jit import kernel
 
-from ..crayons.palette import FRONT
+from ..crayons.pigment import FRONT
 from ..images.icc import encode_srgb
 from ..wax.columns import BLEND, LAYERS
 from ..wax.sheet import Sheet

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from stroke_gen.colour import oklab
 from stroke_gen.drawing import MAX_FORCE_N, Drawing, Stroke, Tip
 
-from ..crayons.palette import Palette, load_palette
+from ..crayons.palette import Palette
+from ..crayons.palette_files import load_palette
 from ..images.icc import decode_srgb
 from ..images.srgb import light_of
 from ..wax.paper import load_paper

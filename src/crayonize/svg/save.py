@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from stroke_gen.drawing import Drawing, Stroke, check_drawing
 from stroke_gen.files import whole_file
 
-from ..crayons.palette import Palette, load_palette
+from ..crayons.palette import Palette
+from ..crayons.palette_files import load_palette
 from ..crayons.used import by_crayon
 
 DAB_MM = 0.01  # a point is drawn as a line this long: plotters and viewers drop lines of no length

@@ -65,7 +65,6 @@ class Shape:
     """One shape on the sheet. lines: (n, 2) in mm each; colours are sRGB 0..1, None for none."""
 
     lines: list[Floats]
-    closed: list[bool]
     stroke: RGB | None
     width_mm: float
     stroke_opacity: float
@@ -212,7 +211,6 @@ class _Walk:
         style = self._style(
             root, {"fill": "black", "stroke": "none", "stroke-width": "1", "color": "black"}
         )
-        self.unit_mm = _scale(matrix)
         for child in root.children:
             self._visit(child, matrix, style, _opacity(style), 1)
 
@@ -306,9 +304,6 @@ class _Walk:
             raise ValueError(f"more than {MAX_POINTS:,} points")
         if not all(np.isfinite(line).all() for line in lines):
             raise ValueError(f"<{element.tag}> has a coordinate beyond all bounds")
-        closed = [
-            len(line) > 2 and bool(np.allclose(line[0], line[-1], atol=1e-6)) for line in lines
-        ]
         stroke_opacity, fill_opacity = (
             opacity * _alpha(style, name) for name in ("stroke", "fill")
         )
@@ -317,7 +312,6 @@ class _Walk:
             self.shapes.append(
                 Shape(
                     lines,
-                    closed,
                     stroke,
                     width,
                     stroke_opacity,
