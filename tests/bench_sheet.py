@@ -7,8 +7,10 @@ import numpy as np
 
 from crayonize.crayons.palette import Palette
 from crayonize.wax import rub
+from crayonize.wax.box import Box
 from crayonize.wax.paper import Paper, tooth
-from crayonize.wax.sheet import Physics, Sheet
+from crayonize.wax.physics import Physics
+from crayonize.wax.sheet import Sheet
 from stroke_gen.drawing import Stroke, Tip
 
 CRAYONS = {  # k and s per um, unlike in all channels
@@ -48,7 +50,7 @@ class Bench:
 
     def draw(self, sheet: Sheet, strokes: list[Stroke], **options: object) -> float:
         """Draw with fresh crayons; returns the wax given in um times cells."""
-        return rub.rub(sheet, strokes, rub.Box(self.palette, self.physics, sheet.cell_mm), **options)
+        return rub.rub(sheet, strokes, Box(self.palette, self.physics, sheet.cell_mm), **options)
 
     def changed(self, **constants: float) -> "Bench":
         """The same bench with other constants of the wax."""
@@ -75,9 +77,20 @@ def old_wax(sheet, rng, thickness=12.0):
             naive.add(column, int(rng.integers(len(sheet.optics))), height, sheet.optics)
         if rng.random() < 0.3:
             column.layers = []
-        sheet.count[cell] = len(column.layers)
+        sheet.used[cell] = len(column.layers)
         for j, (crayon, height) in enumerate(column.layers):
             sheet.crayon[cell, j], sheet.layer[cell, j] = crayon, height
         sheet.blend[cell] = column.blend
         sheet.total[cell] = column.wax()
     return sheet
+
+
+def pigments(sheet: Sheet) -> np.ndarray:
+    """Sums of h, k*h and s*h over the sheet (7): what smearing must not change."""
+    sums = sheet.blend.sum(0, dtype=np.float64)
+    used = np.arange(sheet.layer.shape[1]) < sheet.used[:, None]
+    for index, optics in enumerate(sheet.optics.astype(np.float64)):
+        height = float(sheet.layer[used & (sheet.crayon == index)].sum(dtype=np.float64))
+        sums[0] += height
+        sums[1:] += height * optics
+    return sums

@@ -7,7 +7,7 @@ from bench_sheet import CRAYONS, Bench
 
 from crayonize.crayons.palette import Crayon, Palette
 from crayonize.machine import kernels
-from crayonize.wax import rub
+from crayonize.wax.physics import physics
 
 # a background job is born deaf to it, and so its children
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -36,4 +36,4 @@ def crayons() -> Palette:
 @pytest.fixture(params=["metric", "rudolf2003"])
 def bench(request: pytest.FixtureRequest, crayons: Palette) -> Bench:
     """A bench for each physics preset."""
-    return Bench(rub.physics(request.param), crayons)
+    return Bench(physics(request.param), crayons)

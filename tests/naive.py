@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crayonize.wax.sheet import LAYERS, THIN_UM, Sheet
+from crayonize.wax.sheet import Sheet
+
+LAYERS, THIN_UM = 4, 0.4  # as `columns` has them; own copies, so that a change there is noticed
 
 NEIGHBOURS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 
@@ -34,24 +36,29 @@ def columns_of(sheet: Sheet) -> dict[tuple[int, int], Column]:
     """A sheet as columns."""
     made = {}
     for cell in range(sheet.rows * sheet.cols):
-        layers = [[int(sheet.crayon[cell, j]), float(sheet.layer[cell, j])] for j in range(sheet.count[cell])]
+        layers = [[int(sheet.crayon[cell, j]), float(sheet.layer[cell, j])] for j in range(sheet.used[cell])]
         column = Column(float(sheet.paper[cell]), layers, sheet.blend[cell].astype(float))
         made[divmod(cell, sheet.cols)] = column
     return made
 
 
 def add(column: Column, crayon: int, height: float, optics: np.ndarray, thin: float = THIN_UM) -> None:
-    """Lay wax on a column; below films thinner than `thin` it still finds its own colour."""
+    """Lay wax on a column; below films thinner than `thin` it still finds its own colour.
+
+    From a column too high the thinnest film under `thin` sinks into the blend, or else the lowest.
+    """
     for layer in reversed(column.layers):
         if layer[0] == crayon:
             layer[1] += height
             return
         if layer[1] >= thin:
             break
+    if len(column.layers) == LAYERS:
+        thinnest = min(column.layers, key=lambda layer: layer[1])
+        gone = thinnest if thinnest[1] < thin else column.layers[0]
+        column.layers = [layer for layer in column.layers if layer is not gone]
+        column.blend += gone[1] * np.array([1, *optics[gone[0]]])
     column.layers.append([crayon, height])
-    if len(column.layers) > LAYERS:
-        low, sunk = column.layers.pop(0)
-        column.blend += sunk * np.array([1, *optics[low]])
 
 
 def take(column: Column, height: float) -> tuple[list[list], np.ndarray]:
@@ -85,7 +92,7 @@ def balance(gaps: list[float], wanted: float) -> float:
 
 
 def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1, yields=0.0):
-    """Fig. 7 for all cells in contact at once; changes `over`, returns what the crayon's own wax adds where.
+    """Fig. 7 for all cells in contact at once; returns what the crayon's own wax adds where.
 
     Of the share nu that could move pull / (pull + yields) does, pull being the sum of Eq. 4.
     """
@@ -106,7 +113,6 @@ def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1,
             continue
         pull = sum(weight.values())
         moved = nu * standing * pull / (pull + yields)
-        over[y, x] -= moved
         lifted, from_blend = take(columns[y, x], moved)
         for to, w in weight.items():
             share = w / sum(weight.values())
@@ -125,31 +131,42 @@ def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1,
     return own
 
 
-def height_ahead(tops, y, x, direction) -> tuple[float, float]:
-    """Rise of the surface one cell ahead along the longer axis (0 at the sheet's edge), and that way's length."""
+def ahead(y, x, direction):
+    """The cells around the point one cell ahead along the longer axis, and the share of each."""
     longest = max(abs(direction[0]), abs(direction[1]))
     ax, ay = direction[0] / longest, direction[1] / longest
-    rise = 0.0
     for j in {math.floor(y + ay), math.ceil(y + ay)}:
         for i in {math.floor(x + ax), math.ceil(x + ax)}:
-            share = (1 - abs(y + ay - j)) * (1 - abs(x + ax - i))
-            if (j, i) not in tops:
-                return 0.0, math.hypot(ax, ay)
-            rise += share * (tops[j, i] - tops[y, x])
-    return rise, math.hypot(ax, ay)
+            yield (j, i), (1 - abs(y + ay - j)) * (1 - abs(x + ax - i))
 
 
-def deposit(columns, over, tops, direction, own, mask, push, rate, film, mu_paper, mu_wax, relief, wear, heap):
-    """Fig. 6 for all cells in contact: what breaks off joins `own` and wears `mask`; returns the loss."""
+def height_ahead(tops, y, x, direction) -> tuple[float, float]:
+    """Rise of the surface at the point ahead (0 at the sheet's edge), and the way's length."""
+    way = 1 / max(abs(direction[0]), abs(direction[1]))
+    rise = 0.0
+    for to, share in ahead(y, x, direction):
+        if to not in tops:
+            return 0.0, way
+        rise += share * (tops[to] - tops[y, x])
+    return rise, way
+
+
+def deposit(columns, over, tops, before, direction, own, mask, push, rate, c):
+    """Fig. 6 for all cells in contact: what breaks off joins `own` and wears `mask`; returns the loss.
+
+    before: wax of each cell before it was smeared; a cell's overlap changes by the firm share of what came and went.
+    """
+    film, mu_paper, mu_wax, relief = (float(v) for v in (c.film, c.mu_paper, c.mu_wax, c.relief))
+    wear, heap, firm = float(c.wear), float(c.heap), float(c.firm)
+    now = {cell: column.wax() + own.get(cell, 0.0) for cell, column in columns.items()}
     lost = 0.0
     for cell, overlap in over.items():
-        wax_here = columns[cell].wax() + own.get(cell, 0.0)
-        room = overlap + own.get(cell, 0.0) - heap * wax_here
+        room = overlap + firm * (now[cell] - before[cell]) - heap * now[cell]
         rise, way = height_ahead(tops, *cell, direction)
         sine = math.sin(math.atan2(relief * rise, way) + math.atan2(push, 1))
         if sine <= 0 or room <= 0:
             continue
-        bare = film / (film + wax_here)
+        bare = film / (film + sum(share * now.get(to, 0.0) for to, share in ahead(*cell, direction)))
         mu = bare * mu_paper + (1 - bare) * mu_wax
         given = min(rate * mu * sine, 1.0) * room
         own[cell] = own.get(cell, 0.0) + given
@@ -195,16 +212,19 @@ def contacts(points, stride):
         yield [float(np.interp(along, walked, points[:, c])) for c in range(3)], step / ways[segment]
 
 
-def rub(columns, points, mask, wax, step, smears, constants, per_lambda, optics, reach=1):
+def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, reach=1):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
     c = constants
     points, mask = points.astype(float), mask.astype(float)
     side = mask.shape[0]
-    stride = max(1.0, step * (side - 2 * reach))
+    there = np.argwhere(mask < 1e8)
+    there = there - there.mean(0)
+    extent = max(1.0, 4 * np.sqrt((there**2).sum() / 2 / len(there)))  # of a round tip
+    stride = max(1.0, float(c.step) * extent)
     touches = list(contacts(points, stride))
     if not touches:
         length = np.hypot(*np.diff(points[:, :2], axis=0).T).sum()
-        stride, touches = max(length, 0.04 * (side - 2 * reach)), [(points[-1].tolist(), (1.0, 0.0))]
+        stride, touches = max(length, 0.04 * extent), [(points[-1].tolist(), (1.0, 0.0))]
     given, contact = 0.0, 0
     for n, ((x, y, force), direction) in enumerate(touches):
         if force <= 0:
@@ -220,15 +240,14 @@ def rub(columns, points, mask, wax, step, smears, constants, per_lambda, optics,
         h = balance(list(gaps.values()), min(wanted, float(c.most) * len(gaps)))
         over = {cell: gap - h for cell, gap in gaps.items() if gap > h}
         tops = {cell: column.top(float(c.firm)) for cell, column in columns.items()}
-        own = {}
+        before, own = {cell: column.wax() for cell, column in columns.items()}, {}
         if smears:
             nu = 1 - (1 - float(c.nu)) ** stride
             cells = hop(n, float(c.hop), float(c.scatter))
             own = smear(columns, over, tops, direction, wax, nu, c.alpha, c.beta, optics, cells, float(c.yields))
         worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
         push, rate = float(c.push) if c.push > 0 else force, float(c.rate) * stride
-        given += deposit(columns, over, tops, direction, own, worn, push, rate, float(c.film), c.mu_paper,
-                         c.mu_wax, float(c.relief), float(c.wear), float(c.heap))  # fmt: skip
+        given += deposit(columns, over, tops, before, direction, own, worn, push, rate, c)
         for cell, height in worn.items():
             mask[cell[0] - top, cell[1] - left] = height
         for cell, height in own.items():

@@ -25,6 +25,7 @@ from stroke_gen.drawing_file import load_drawing
 
 PHYSICS, PALETTE = "rudolf2003", "rudolf2003"
 BLACK_PAPER = "lunar:#1c1b1d"
+BLUE_PAPER = "lunar:#5a86b8"  # on which white shows as well as black
 FORCES_N = (0.13, 0.33, 0.88, 2.2)  # from a breath to a firm hand, on a tip of 2.4 mm
 LIGHT, HEAVY = 0.15, 0.9  # N per mm^2 of tip
 SIDE = 14.0  # of a swatch, mm
@@ -79,7 +80,7 @@ def deposition_and_smearing(cell: float) -> list[Easel]:
 def crayons(cell: float) -> list[Easel]:
     """Fig.
 
-    10: every crayon light (first row) and heavy (second row), on white and on black paper.
+    10: every crayon light (first row) and heavy (second row), on white, black and blue paper.
     """
     names = [crayon.name for crayon in load_palette(PALETTE).crayons]
     strokes = [
@@ -93,7 +94,8 @@ def crayons(cell: float) -> list[Easel]:
         for j, pressure in enumerate((LIGHT, HEAVY))
     ]
     return [
-        drawn(paper, SIDE * len(names), SIDE * 2, strokes, cell) for paper in ("lunar", BLACK_PAPER)
+        drawn(paper, SIDE * len(names), SIDE * 2, strokes, cell)
+        for paper in ("lunar", BLACK_PAPER, BLUE_PAPER)
     ]
 
 

@@ -123,7 +123,7 @@ def draw(
     size: long side of the picture in pixels, 1 to 20000.
     out: where to write the picture as well.
     threads: at most so many at once; they change nothing in the picture. None: all cores.
-    preview: without smearing and at half the size.
+    preview: at half the size.
     light, progress: as in `convert`.
 
     Returns

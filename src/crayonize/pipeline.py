@@ -19,6 +19,8 @@ from .light import optics
 from .machine import cores
 from .settings import Settings
 from .wax import paper, rub
+from .wax.box import Box
+from .wax.physics import physics
 from .wax.sheet import Sheet
 
 Progress = Callable[[str, float], None]  # what is being done, how much of all is done (0..1)
@@ -42,7 +44,7 @@ class Easel:
     """An open sheet with its paper and crayons: strokes go on, pictures come off."""
 
     sheet: Sheet
-    box: rub.Box
+    box: Box
     ground: tuple[float, float, float]
     threads: int
     smears: bool = True
@@ -104,17 +106,11 @@ def easel(
         max(1, round(drawing.width_mm / cell_mm)),
     )
     tooth = paper.tooth(sheet_paper, rows, cols, cell_mm, drawing.seed)
-    sheet = Sheet(tooth, cell_mm, *_optics(palette))
-    box = rub.Box(palette, rub.physics(drawing.physics), cell_mm, drawing.seed)
+    box = Box(palette, physics(drawing.physics), cell_mm, drawing.seed)
+    sheet = Sheet(tooth, cell_mm, *box.optics())
     return Easel(
         sheet, box, paper.colour_linear(sheet_paper.colour), threads or cores.allowed(), smears
     )
-
-
-def _optics(palette: Palette) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """k and s of all crayons, (crayons, 3) each."""
-    k = np.array([c.k for c in palette.crayons], np.float32)
-    return k, np.array([c.s for c in palette.crayons], np.float32)
 
 
 def draw(
@@ -128,9 +124,9 @@ def draw(
 ) -> Easel:
     """A drawing on paper, `size` cells along the long side; `.picture()` shows it.
 
-    preview: without smearing and at half the size (section 5 of the paper).
+    preview: at half the size (section 5 of the paper).
     """
-    stand = easel(drawing, max(1, size // 2) if preview else size, threads, smears=not preview)
+    stand = easel(drawing, max(1, size // 2) if preview else size, threads)
     stand.show_to(watch)
     stand.draw(drawing.strokes, progress and (lambda done, all_: progress("drawing", done / all_)))
     return stand
@@ -157,9 +153,8 @@ def sketch(
         blank,
         max(1, settings.size // 2) if settings.preview else settings.size,
         settings.threads,
-        not settings.preview,
-        settings.box,
-        settings.ground,
+        palette=settings.box,
+        ground=settings.ground,
     )
     stand.show_to(watch)
     table = calibration.swatches(settings.box, settings.ground, settings.physics, stand.threads)

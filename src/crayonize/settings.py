@@ -23,6 +23,10 @@ _PARSED = {  # what is kept -> the choices that it comes from
 }
 
 
+# What can be drawn with, and its constants in data/physics.toml.
+MEDIA = {"crayon": "metric", "oil-pastel": "oil-pastel", "pencil": "pencil"}
+
+
 @dataclass(frozen=True)
 class Settings:
     """All choices for drawing a photo, with their defaults.
@@ -38,7 +42,7 @@ class Settings:
     size: int = 1600  # long side of the picture in pixels
     sheet_mm: float = 210.0  # long side of the sheet: A5
     seed: int = 0
-    physics: str = "metric"
+    physics: str = "metric"  # the medium: metric is a crayon, or oil-pastel, pencil
     threads: int | None = None  # all cores
     preview: bool = False
     age: int | None = None  # of the one who draws, 3 to 10, for style child

@@ -7,7 +7,7 @@ from bench_sheet import Bench, old_wax
 
 from crayonize.images.icc import encode_srgb
 from crayonize.light import optics
-from crayonize.wax import rub
+from crayonize.wax.physics import physics
 
 over = optics._over
 FRONT, FILM_UM = 0.0325, 0.5  # what wax of refractive index 1.44 reflects, and the film that does half of it
@@ -16,7 +16,7 @@ FRONT, FILM_UM = 0.0325, 0.5  # what wax of refractive index 1.44 reflects, and 
 @pytest.fixture
 def table(crayons):
     """A bench for pictures, where the physics does not matter."""
-    return Bench(rub.physics("metric"), crayons)
+    return Bench(physics("metric"), crayons)
 
 
 def films(table, columns, ground=(1.0, 1.0, 1.0), light=False):
@@ -24,7 +24,7 @@ def films(table, columns, ground=(1.0, 1.0, 1.0), light=False):
     sheet = table.sheet(np.zeros((1, len(columns))))
     names = [c.name for c in table.palette.crayons]
     for cell, column in enumerate(columns):
-        sheet.count[cell] = len(column)
+        sheet.used[cell] = len(column)
         for j, (crayon, height) in enumerate(column):
             sheet.crayon[cell, j], sheet.layer[cell, j] = names.index(crayon), height
         sheet.total[cell] = sum(height for _, height in column)
@@ -141,7 +141,7 @@ def test_the_lamp_can_be_switched_off(table, monkeypatch):
     rng = np.random.default_rng(5)
     rough = old_wax(table.sheet(40 * rng.random((40, 40))), rng)
     flat = table.sheet(np.zeros((40, 40)))
-    for name in ("total", "count", "crayon", "layer", "blend"):
+    for name in ("total", "used", "crayon", "layer", "blend"):
         getattr(flat, name)[:] = getattr(rough, name)
     off = optics.render(rough, (0.7, 0.7, 0.7), light=False)
     np.testing.assert_array_equal(off, optics.render(flat, (0.7, 0.7, 0.7), light=False))
@@ -181,7 +181,7 @@ def test_relief_shows_on_black_wax_by_its_gloss(table):
     for crayon in ("black", "white"):
         sheet = table.sheet(waves)
         sheet.total[:] = sheet.layer[:, 0] = 60.0
-        sheet.count[:], sheet.crayon[:, 0] = 1, [c.name for c in table.palette.crayons].index(crayon)
+        sheet.used[:], sheet.crayon[:, 0] = 1, [c.name for c in table.palette.crayons].index(crayon)
         lit = optics.render(sheet, (0.9, 0.9, 0.9))
         contrast.append(lit.std() / lit.mean())
     assert contrast[0] > 2 * contrast[1] > 0

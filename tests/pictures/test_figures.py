@@ -39,7 +39,7 @@ def part(values: np.ndarray, easel: Easel, *box: float) -> np.ndarray:
 def wax_of(easel: Easel, crayon: str) -> np.ndarray:
     """Height in um of one crayon's wax on every cell, as far as it is pure."""
     sheet = easel.sheet
-    used = np.arange(sheet.layer.shape[1]) < sheet.count[:, None]
+    used = np.arange(sheet.layer.shape[1]) < sheet.used[:, None]
     height = (sheet.layer * (used & (sheet.crayon == easel.box.palette.index(crayon)))).sum(1)
     return height.reshape(sheet.rows, sheet.cols)
 

@@ -62,7 +62,16 @@ def test_grain_grows_with_the_wavelength(kind):
         assert long == pytest.approx(2 * short, rel=0.2)
 
 
-@pytest.mark.parametrize("kind", ["pressed", "felt", "lunar"])
+def test_lunar_is_of_one_arc_as_if_lit_from_one_side():
+    """A quarter circle lies along one diagonal: longer that way than across it."""
+    with_arc, across = (
+        np.mean([correlation_mm(heights("lunar", 640, 0.05, seed), 0.05, way) for seed in range(4)])
+        for way in ((1, -1), (1, 1))
+    )
+    assert with_arc > 1.15 * across
+
+
+@pytest.mark.parametrize("kind", ["pressed", "felt"])
 def test_papers_are_alike_in_all_directions(kind):
     lengths = [
         np.mean([correlation_mm(heights(kind, 640, 0.05, seed), 0.05, way) for seed in range(6)])

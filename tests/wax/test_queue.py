@@ -106,9 +106,9 @@ def test_strokes_of_one_level_change_disjoint_cells(bench, monkeypatch):
     for number, stroke in enumerate(strokes):
         sheet = bench.felt(200, 200)
         sheet.total[:] = sheet.layer[:, 0] = coat
-        sheet.count[:], sheet.crayon[:, 0] = 1, 5
+        sheet.used[:], sheet.crayon[:, 0] = 1, 5
         bench.draw(sheet, [stroke])
-        changed = (sheet.total != coat) | (sheet.layer[:, 0] != coat) | (sheet.count != 1)
+        changed = (sheet.total != coat) | (sheet.layer[:, 0] != coat) | (sheet.used != 1)
         assert (owner[level[number], changed] == -1).all()
         owner[level[number], changed] = number
 
@@ -121,7 +121,7 @@ def test_no_cell_beyond_the_reach_is_changed(bench, monkeypatch, kind):
     for _ in range(30):
         sheet = bench.sheet(np.zeros((80, 80)))
         sheet.total[:] = sheet.layer[:, 0] = 20
-        sheet.count[:], sheet.crayon[:, 0] = 1, 5
+        sheet.used[:], sheet.crayon[:, 0] = 1, 5
         x, y = rng.uniform(3.5, 4.5, 2)
         bench.draw(sheet, [bench.stroke([[x, y]], 12.0, tip=Tip(kind, 2.0))])
         rows, cols = np.divmod(np.flatnonzero(sheet.total != 20), 80)

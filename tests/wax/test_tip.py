@@ -3,17 +3,14 @@
 import numpy as np
 import pytest
 
-from crayonize.wax import contact, tip
-from stroke_gen.drawing import Tip
+from crayonize.wax import tip
+from stroke_gen.drawing import SIDE_MM, Tip
 
 KINDS = ("sharp", "blunt", "rim", "side")
 
 
 def made(kind="blunt", width_mm=2.4, cell_mm=0.1, worn_um=0.0, angle_deg=0.0, seed=0):
-    mask = tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed))
-    desk = contact.window(mask.size, 1)
-    contact._press(desk, mask.ravel(), np.float32(worn_um), len(mask), 1000)
-    return desk.mask.reshape(mask.shape)
+    return tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed), 0.0, worn_um)
 
 
 def extent_mm(mask, cell_mm):
@@ -44,7 +41,7 @@ def test_a_side_is_a_strip_of_its_length_and_breadth():
     for cell_mm in (0.2, 0.1):
         across, along = extent_mm(made("side", 8.0, cell_mm), cell_mm)
         assert along == pytest.approx(8.0, abs=1.01 * cell_mm)
-        assert across == pytest.approx(tip.SIDE_MM, abs=1.01 * cell_mm)
+        assert across == pytest.approx(SIDE_MM, abs=1.01 * cell_mm)
         across, along = extent_mm(made("side", 8.0, cell_mm, angle_deg=90), cell_mm)
         assert across == pytest.approx(8.0, abs=1.01 * cell_mm)
 
@@ -70,16 +67,26 @@ def test_a_sharp_tip_falls_away_faster_than_a_blunt_one(monkeypatch):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_wear_cuts_the_profile_flat_from_below(kind):
+def test_wear_cuts_the_profile_flat_from_below(kind, monkeypatch):
+    """... at the level at which what is cut off has the mean height asked for; at `flat_um` nothing is left."""
+    monkeypatch.setattr(tip, "BUMP_UM", 0.0)
     fresh = made(kind)
     there = fresh < tip.ABSENT
     flat = []
-    for worn_um in (0.0, 5.0, 15.0, 40.0):
-        worn = made(kind, worn_um=worn_um)
+    for share in (0.0, 0.2, 0.6, 1.02):
+        worn = made(kind, worn_um=share * tip.flat_um(Tip(kind, 2.4)))
         np.testing.assert_array_equal(worn < tip.ABSENT, there)
-        np.testing.assert_allclose(worn[there], np.maximum(fresh[there] - worn_um, 0), atol=1e-4)
-        flat.append((worn == 0).sum())
-    assert flat == sorted(flat) and flat[-1] > flat[0]
+        level = (fresh - worn)[there].max()
+        np.testing.assert_allclose(worn[there], np.maximum(fresh[there] - level, 0), atol=1e-3)
+        lost = np.maximum(level - fresh[there], 0).mean()
+        if kind in ("sharp", "blunt"):
+            assert lost == pytest.approx(
+                min(share, 1) * (fresh[there].max() - fresh[there]).mean(), rel=0.15, abs=0.5
+            )
+        flat.append((worn[there] < 1e-3).sum())
+    assert flat == sorted(flat) and flat[2] > flat[0]
+    if kind in ("sharp", "blunt"):
+        assert flat[-1] == there.sum()
 
 
 def test_bumps_come_from_the_seed_only():

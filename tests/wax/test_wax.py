@@ -1,16 +1,21 @@
 """Wax: each kernel against its slow twin, and the laws of contact, deposit, smearing and wear."""
 
 import itertools
+from dataclasses import replace
 
 import naive
 import numpy as np
 import pytest
-from bench_sheet import old_wax
+from bench_sheet import Bench, old_wax, pigments
 
-from crayonize.wax import contact, rub
-from crayonize.wax import queue as schedule
-from crayonize.wax import sheet as wax
-from crayonize.wax.tip import ABSENT
+from crayonize.wax import columns as wax
+from crayonize.wax import contact, rub, smear, window
+from crayonize.wax.box import WEAR_LEVELS, Box
+from crayonize.wax.deposit import deposit
+from crayonize.wax.force import balance, overlap
+from crayonize.wax.physics import THIN_UM, physics
+from crayonize.wax.sheet import Sheet
+from crayonize.wax.tip import ABSENT, flat_um
 from crayonize.wax.tip import mask as tip_mask
 from stroke_gen.drawing import Tip
 
@@ -35,16 +40,16 @@ class Window:
     def __init__(self, sheet, mask, top, left, wanted, reach=1):
         self.sheet, self.top, self.left, self.reach = sheet, top, left, reach
         self.side, self.size, self.home = mask.shape[0], mask.size, top * sheet.cols + left
-        self.w = contact.window(mask.size, len(sheet.optics))
+        self.w = window.window(mask.size, len(sheet.optics))
         self.w.mask[:] = mask.ravel()
         self.w.where[:] = (np.arange(self.side)[:, None] * sheet.cols + np.arange(self.side)).ravel()
         present = int((mask < ABSENT).sum())
-        share = contact._look(
+        share = window.look(
             self.w, self.side, present, top, left, sheet.rows, sheet.cols, np.float32(1), sheet.columns()
         )
         self.inside, self.gap = share * present, self.w.over.copy()
-        self.h = contact._balance(self.w.over, np.float32(wanted), np.float32(1e9), np.float32(1e-3))
-        contact._overlap(self.w.over, self.h)
+        self.h = balance(self.w.over, np.float32(wanted), np.float32(1e9), np.float32(1e-3))
+        overlap(self.w.over, self.h)
         self.touch = np.flatnonzero(self.w.over)
         self.inflow = self.w.arriving[: self.size]
 
@@ -67,20 +72,26 @@ class Window:
     def smear(self, direction, crayon, nu, yields, alpha=0.2, beta=0.8):
         """Smear, and lay all wax but that of the crayon in hand; returns how many other crayons moved."""
         columns, v = self.sheet.columns(), np.float32(direction)
-        contact._open(self.w, self.size, 0, crayon, 0)
-        contact._weigh(self.w, self.side, self.reach, v[0], v[1], np.float32(alpha), np.float32(beta))
-        slots = contact._smear(self.w, self.side, self.reach, self.home, np.float32(nu), np.float32(yields),
+        smear.open_slot(self.w, self.size, 0, crayon, 0)
+        smear.weigh(self.w, self.side, self.reach, v[0], v[1], np.float32(alpha), np.float32(beta))
+        slots = smear.smear(self.w, self.side, self.reach, self.home, np.float32(nu), np.float32(yields),
                                columns)  # fmt: skip
         own = self.inflow.copy()
         self.inflow[:] = 0
-        contact._settle(self.w, slots, self.home, np.float32(wax.THIN_UM), columns)
+        smear.settle(self.w, slots, self.home, np.float32(THIN_UM), columns)
         self.inflow[:] = own
         return slots - 1
 
-    def deposit(self, direction, push, rate, film, mu_paper, mu_wax, relief, wear, heap):
+    def deposit(self, direction, push, constants):
+        """Rub wax off over one cell of the way; returns the loss."""
         v = np.float32(direction)
-        rest = (np.float32(c) for c in (push, rate, film, mu_paper, mu_wax, relief, wear, heap))
-        return contact._deposit(self.w, self.side, self.reach, v[0], v[1], *rest)
+        return deposit(self.w, self.side, self.reach, v[0], v[1], np.float32(push), np.float32(1), constants)
+
+
+def constants_of(bench, **values):
+    """The bench's constants for its own cells, some of them changed."""
+    constants = bench.physics.constants(0.1)
+    return constants._replace(**{name: np.float32(value) for name, value in values.items()})
 
 
 def small_mask(rng, side=WINDOW, reach=1):
@@ -108,10 +119,10 @@ def test_balance_is_the_bisection_of_fig_4(start):
     rng = np.random.default_rng(1)
     for wanted in 10.0 ** np.arange(-1, 4.5, 0.5):
         gap = np.append(60 * rng.standard_normal(200), [-1e9] * 9).astype(np.float32)
-        h = contact._balance(gap, np.float32(wanted), np.float32(start), np.float32(1e-4 * wanted))
+        h = balance(gap, np.float32(wanted), np.float32(start), np.float32(1e-4 * wanted))
         assert abs(h - naive.balance(gap.tolist(), wanted)) < 2e-4 * wanted + 1e-3
         over = gap.copy()
-        contact._overlap(over, h)
+        overlap(over, h)
         np.testing.assert_allclose(over, np.maximum(gap - h, 0), atol=1e-3)
 
 
@@ -122,13 +133,13 @@ def test_add_keeps_order_merges_colours_and_sinks_into_the_blend(bench):
     sunk = 0
     for _ in range(3000):
         crayon, height = int(rng.integers(len(sheet.optics))), float(np.float32(3 * rng.random() ** 4))
-        contact._add(0, np.uint8(crayon), np.float32(height), np.float32(wax.THIN_UM), sheet.columns())
+        wax.add(0, np.uint8(crayon), np.float32(height), np.float32(THIN_UM), sheet.columns())
         naive.add(column, crayon, height, sheet.optics)
-        assert sheet.crayon[0, : sheet.count[0]].tolist() == [c for c, _ in column.layers]
+        assert sheet.crayon[0, : sheet.used[0]].tolist() == [c for c, _ in column.layers]
         sunk += column.blend[0] > 0
     assert sunk > 2000
     np.testing.assert_allclose(sheet.blend[0], column.blend, rtol=1e-4)
-    np.testing.assert_allclose(sheet.layer[0, : sheet.count[0]], [h for _, h in column.layers], rtol=1e-4)
+    np.testing.assert_allclose(sheet.layer[0, : sheet.used[0]], [h for _, h in column.layers], rtol=1e-4)
 
 
 def test_look_sees_the_surface_and_nothing_off_the_sheet(bench):
@@ -160,28 +171,32 @@ def test_smear_is_fig_7(bench, nu, reach, yields):
         others += window.smear(direction, turn % 3, nu, yields)
         own = naive.smear(columns, over, tops, direction, turn % 3, nu, 0.2, 0.8, sheet.optics, reach, yields)
         assert_same(sheet, columns)
-        assert over.keys() == window.overlaps().keys()
-        np.testing.assert_allclose(list(window.overlaps().values()), list(over.values()), atol=1e-3)
         for at in own.keys() | window.own().keys():
             assert abs(own.get(at, 0.0) - window.own().get(at, 0.0)) < 1e-3
         from_blend += abs(sum(c.blend[0] for c in columns.values()) - before)
     assert from_blend > 1 and others > 20  # layers sank, blends moved
 
 
-@pytest.mark.parametrize("push, rate, heap", [(0.3, 0.4, 0), (1.0, 0.4, 0.6), (4.0, 0.4, 1), (1.0, 3.0, 0.3)])
-def test_deposit_is_fig_6(bench, push, rate, heap):
+@pytest.mark.parametrize(
+    "push, rate, heap, firm", [(0.3, 0.4, 0, 1), (1.0, 0.4, 0.6, 0.3), (4.0, 0.4, 1, 1), (1.0, 3.0, 0.3, 0)]
+)
+def test_deposit_is_fig_6(bench, push, rate, heap, firm):
     rng = np.random.default_rng(5)
     sheet = old_wax(bench.sheet(40 * rng.random((19, 23))), rng)
     given = []
     for turn, (top, left) in enumerate(corners(sheet)):
         window = Window(sheet, small_mask(rng), top, left, 400.0)
-        window.inflow[window.touch] = rng.random(window.touch.size)
+        window.inflow[window.touch] = rng.random(window.touch.size)  # as if smeared from elsewhere
+        window.w.film[window.touch] += window.inflow[window.touch]
         columns, own = naive.columns_of(sheet), window.own()
         tops = {at: column.top() for at, column in columns.items()}
-        direction, constants = towards(35 * turn), (push, rate, 5.0, 2.0, 0.5, 0.2, 0.7, heap)
-        worn = window.heights()
-        lost = naive.deposit(columns, window.overlaps(), tops, direction, own, worn, *constants)
-        assert window.deposit(direction, *constants) == pytest.approx(lost, rel=1e-4)
+        before = {at: column.wax() for at, column in columns.items()}
+        constants = constants_of(bench, rate=rate, film=5.0, relief=0.2, wear=0.7, heap=heap, firm=firm)
+        direction, worn = towards(35 * turn), window.heights()
+        lost = naive.deposit(
+            columns, window.overlaps(), tops, before, direction, own, worn, push, rate, constants
+        )
+        assert window.deposit(direction, push, constants) == pytest.approx(lost, rel=1e-4)
         assert own == pytest.approx(window.own(), abs=1e-3)
         assert worn == pytest.approx(window.heights(), abs=1e-3)
         given.append(lost)
@@ -212,16 +227,14 @@ def test_a_stroke_is_fig_3(bench, path, reach):
     constants = bench.changed(epsilon_um=1e-4).physics.constants(sheet.cell_mm)  # the twin's force is exact
     mean, scatter = {1: (1.0, 0.0), 2: (1.5, 0.5)}[reach]
     constants = constants._replace(hop=np.float32(mean), scatter=np.float32(scatter))
-    loss, one, crayon = np.zeros(1), np.zeros(1, np.int64), 2
-    first = np.array([0, len(points)])
-    queue = schedule.queue(schedule.order(points, first, np.ones(1, np.float32), sheet.rows, sheet.cols))
-    contact._rub(queue, schedule.NONE, False, points, first, one + crayon, one, np.zeros(1, np.float32),
-                 mask.reshape(1, -1), np.array([len(mask)]), reach, np.float32(0.2), smears, constants, per_lambda,
-                 sheet.rows, sheet.cols, sheet.columns(), loss,
-                 contact.window(mask.size, len(sheet.optics)))  # fmt: skip
-    given = naive.rub(columns, points, mask, crayon, 0.2, smears, constants, float(per_lambda), sheet.optics, reach)
+    desk, crayon = window.window(mask.size, len(sheet.optics)), 2
+    constants = constants._replace(step=np.float32(0.2))
+    table = contact.Table(smears, constants, per_lambda, sheet.rows, sheet.cols, sheet.columns())
+    held = contact.press(desk, mask.ravel(), crayon, len(mask), reach, sheet.cols)
+    loss = contact.stroke(desk, held, table, points)
+    given = naive.rub(columns, points, mask, crayon, smears, constants, float(per_lambda), sheet.optics, reach)
     assert given > 1
-    assert loss[0] == pytest.approx(given, rel=1e-3)
+    assert loss == pytest.approx(given, rel=1e-3)
     assert_same(sheet, columns, 0.02)
 
 
@@ -230,18 +243,18 @@ def test_a_stroke_is_fig_3(bench, path, reach):
 
 def column_sums(sheet):
     """Height of the wax of each cell, from its layers and blend."""
-    used = np.arange(wax.LAYERS) < sheet.count[:, None]
+    used = np.arange(wax.LAYERS) < sheet.used[:, None]
     return (sheet.layer * used).sum(1, dtype=float) + sheet.blend[:, 0]
 
 
 def test_the_sheet_gains_what_the_crayons_lose(bench):
     sheet = bench.felt(150, 150)
-    box = rub.Box(bench.palette, bench.physics, sheet.cell_mm)
+    box = Box(bench.palette, bench.physics, sheet.cell_mm)
     given = rub.rub(sheet, bench.scribble(np.random.default_rng(7), 60, 15.0), box, threads=2)
     assert given > 1000
-    assert sheet.pigments()[0] == pytest.approx(given, rel=1e-5)
+    assert pigments(sheet)[0] == pytest.approx(given, rel=1e-5)
     by_crayon = [box.given_mm3.get(c.name, 0.0) * 1000 / sheet.cell_mm**2 for c in bench.palette.crayons]
-    np.testing.assert_allclose(sheet.pigments()[1:], by_crayon @ sheet.optics.astype(float), rtol=1e-4)
+    np.testing.assert_allclose(pigments(sheet)[1:], by_crayon @ sheet.optics.astype(float), rtol=1e-4)
 
 
 def test_the_mask_loses_its_share_of_what_breaks_off(bench):
@@ -249,7 +262,7 @@ def test_the_mask_loses_its_share_of_what_breaks_off(bench):
     sheet = bench.sheet(40 * rng.random((20, 20)))
     window = Window(sheet, small_mask(rng), 4, 4, 300.0)
     before = window.w.mask.astype(float)
-    lost = window.deposit(towards(20), 1.0, 0.3, 5.0, 2.0, 0.5, 1.0, 0.25, 0.5)
+    lost = window.deposit(towards(20), 1.0, constants_of(bench, rate=0.3, relief=1.0, wear=0.25, heap=0.5))
     assert (window.w.mask - before)[before < ABSENT].sum() == pytest.approx(0.25 * lost, rel=1e-4)
     assert window.inflow.sum(dtype=float) == pytest.approx(lost, rel=1e-5)
     untouched = np.setdiff1d(np.arange(before.size), window.touch)
@@ -259,19 +272,19 @@ def test_the_mask_loses_its_share_of_what_breaks_off(bench):
 def test_smearing_moves_every_pigment_and_makes_none(bench):
     rng = np.random.default_rng(9)
     sheet = old_wax(bench.felt(150, 150), rng)
-    before, film = sheet.pigments(), sheet.film_um().copy()
+    before, film = pigments(sheet), sheet.film_um().copy()
     given = bench.changed(rate_per_mm=0.0).draw(sheet, bench.scribble(rng, 60, 15.0))
     assert given == 0
     assert np.abs(sheet.film_um() - film).mean() > 0.1
-    np.testing.assert_allclose(sheet.pigments(), before, rtol=1e-5)
+    np.testing.assert_allclose(pigments(sheet), before, rtol=1e-5)
 
 
 def test_no_negative_no_nan_after_many_strokes(bench):
     rng = np.random.default_rng(10)
     sheet = bench.felt(120, 120)
     bench.draw(sheet, bench.scribble(rng, 700, 12.0, um=20.0), threads=2)
-    assert (sheet.count == wax.LAYERS).mean() > 0.3 and (sheet.blend[:, 0] > 0).mean() > 0.3
-    for heights in (sheet.total, sheet.layer[np.arange(wax.LAYERS) < sheet.count[:, None]], sheet.blend):
+    assert (sheet.used == wax.LAYERS).mean() > 0.3 and (sheet.blend[:, 0] > 0).mean() > 0.3
+    for heights in (sheet.total, sheet.layer[np.arange(wax.LAYERS) < sheet.used[:, None]], sheet.blend):
         assert np.isfinite(heights).all() and heights.min() >= 0
     np.testing.assert_allclose(sheet.total, column_sums(sheet), rtol=1e-5, atol=1e-3)
 
@@ -291,7 +304,7 @@ def test_the_force_is_reached_over_five_decades(bench, kind, teeth):
         window = Window(sheet, mask, 9, 9, 1.0)
         for start, wanted in itertools.product((np.float32(1e9), window.h), np.float32(10.0) ** np.arange(0, 5.1)):
             allowed = min(epsilon, 0.01 * wanted)
-            h = contact._balance(window.gap, wanted, start, np.float32(allowed))
+            h = balance(window.gap, wanted, start, np.float32(allowed))
             assert np.maximum(window.gap.astype(float) - h, 0).sum() == pytest.approx(wanted, abs=allowed, rel=1e-6)
 
 
@@ -400,7 +413,7 @@ def test_a_second_colour_is_taken_up_less_where_wax_lies(bench):
     sheet = bench.felt(120, 240)
     bench.draw(sheet, hatching(bench, 12.0, 12.0))  # the left half
     bench.draw(sheet, [bench.stroke([[1, y], [23, y]], 3.0, "blue") for y in (3, 6, 9)])
-    blue = np.where((sheet.crayon == 2) & (np.arange(wax.LAYERS) < sheet.count[:, None]), sheet.layer, 0).sum(1)
+    blue = np.where((sheet.crayon == 2) & (np.arange(wax.LAYERS) < sheet.used[:, None]), sheet.layer, 0).sum(1)
     left, right = blue.reshape(120, 240)[:, 20:110].mean(), blue.reshape(120, 240)[:, 130:220].mean()
     assert 0 < left < 0.9 * right
 
@@ -409,15 +422,52 @@ def test_a_second_colour_is_taken_up_less_where_wax_lies(bench):
 
 
 @pytest.mark.parametrize("um", [2.0, 12.0])
-def test_halving_the_step_changes_the_film_little(bench, monkeypatch, um):
+def test_halving_the_step_changes_the_film_little(bench, um):
     films = []
-    for step in (rub.STEP, rub.STEP / 2):
-        monkeypatch.setattr(rub, "STEP", step)
+    for step in (0.14, 0.07):
         sheet = bench.felt(120, 120)
-        bench.draw(sheet, hatching(bench, um, 12.0))
+        bench.changed(step=step).draw(sheet, hatching(bench, um, 12.0))
         films.append(sheet.total.mean())
     # Table 1's slopes count a hundredfold, so that most faces take all wax or none, and the step matters more.
     assert films[1] == pytest.approx(films[0], rel=0.15 if bench.physics.push == 0 else 0.1)
+
+
+def test_the_papers_crayon_goes_cell_by_cell():
+    """Section 3.3 puts its points P_i as near as the paper's cells."""
+    for kind, width in (("sharp", 0.6), ("blunt", 5.0), ("side", 20.0)):
+        assert contacts_on_a_way(physics("rudolf2003"), Tip(kind, width), 8.0) == 80
+
+
+@pytest.mark.parametrize("angle", [0, 30, 90])
+def test_a_stride_is_a_share_of_the_tip_along_its_way(angle):
+    """A side of 20 mm drawn across its long axis touches 2.6 mm of the way, not 20: no ladder."""
+    for kind, width, along, breadth in (("blunt", 2.4, 2.4, 2.4), ("side", 20.0, 20.0, 2.6), ("rim", 6.0, 3.9, 6.0)):
+        for heading, extent in ((angle, along), (angle + 90, breadth)):
+            tip = Tip(kind, width, angle_deg=angle)
+            strides = 48 / contacts_on_a_way(physics("metric"), tip, 48.0, heading)
+            assert strides == pytest.approx(physics("metric").step * extent, rel=0.3)
+
+
+def contacts_on_a_way(wax_physics, tip, length_mm, heading=0.0, cell_mm=0.1):
+    """How many contacts a stroke has on a blank sheet."""
+    mask = np.pad(tip_mask(tip, cell_mm, np.random.default_rng(0)), 1, constant_values=ABSENT)
+    desk, n = window.window(mask.size, 1), 40
+    sheet = Sheet(np.zeros((n, n), np.float32), cell_mm, np.ones((1, 3), np.float32), np.ones((1, 3), np.float32))
+    constants = wax_physics.constants(cell_mm)
+    table = contact.Table(False, constants, np.float32(1), n, n, sheet.columns())
+    ends = np.array([[0, 0, 1], [*(np.array(towards(heading)) * length_mm / cell_mm), 1]], np.float32)
+    held = contact.press(desk, mask.ravel(), 0, len(mask), 1, n)
+    contact.stroke(desk, held, table, ends)
+    return int(desk.hand[window.CONTACTS])
+
+
+def test_a_side_drawn_across_its_long_axis_leaves_no_ladder(bench):
+    if bench.physics.push == 0:
+        pytest.skip("cell by cell there is no stride")
+    sheet = bench.changed(slip=0.0).sheet(np.zeros((260, 300)))
+    bench.changed(slip=0.0).draw(sheet, [bench.stroke([[4, 13], [26, 13]], 6.0, tip=Tip("side", 20.0, 90.0))])
+    along = sheet.film_um()[80:180, 80:220].mean(0)
+    assert along.std() < 0.15 * along.mean()
 
 
 @pytest.mark.parametrize("um", [1.0, 4.0, 12.0])
@@ -446,7 +496,7 @@ def test_wax_is_smeared_equally_far_at_any_resolution(bench):
         on = np.abs(x - 4.5) < 0.8
         for seed in range(4):
             sheet, band = bench.felt(n, n, cell_mm, seed), np.tile(on, n)
-            sheet.total[band], sheet.count[band], sheet.layer[band, 0], sheet.crayon[band, 0] = 20, 1, 20, 2
+            sheet.total[band], sheet.used[band], sheet.layer[band, 0], sheet.crayon[band, 0] = 20, 1, 20, 2
             across = [bench.stroke([[1, y], [8, y]], 8.0) for y in np.arange(1, 8.1, 0.6)]
             bench.changed(rate_per_mm=0.0).draw(sheet, across)
             film = sheet.film_um()[round(2 / cell_mm) : round(7 / cell_mm)].mean(0)
@@ -456,8 +506,8 @@ def test_wax_is_smeared_equally_far_at_any_resolution(bench):
         beyond.append(np.mean(runs, 0)[1])
     if bench.physics.push:
         assert np.ptp(drift) < 0.25 * np.mean(drift) and np.ptp(beyond) < 0.6 * np.mean(beyond)
-    else:  # as printed, Fig. 7 moves a share that knows no pull, and overshoots on coarse cells
-        assert np.ptp(drift[1:]) < 0.25 * np.mean(drift)
+    else:  # cell by cell, as printed, each contact moves a share that knows no pull
+        assert np.ptp(drift[1:]) < 0.6 * np.mean(drift)
 
 
 @pytest.mark.parametrize("cell_mm", [297 / 1600, 0.0667])
@@ -473,8 +523,7 @@ def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
     film = sheet.film_um()[n // 4 : -n // 4, n // 4 : -n // 4].astype(float)
     fine = film - (np.roll(film, 1, 0) + np.roll(film, -1, 0) + np.roll(film, 1, 1) + np.roll(film, -1, 1)) / 4
     fine = fine[2:-2, 2:-2]
-    assert fine.std() < 0.06 * film.mean()
-    assert (fine[1:] * fine[:-1]).mean() > -0.2 * fine.var()  # every other cell high: -.26 to -.41 if nothing yields
+    assert fine.std() < (0.075 if um == 10 else 0.065) * film.mean()  # .092 under heavy force if nothing yields
 
 
 def test_nothing_is_pressed_harder_than_wax_bears(bench):
@@ -509,7 +558,9 @@ def test_a_long_stroke_has_no_rhythm(bench):
     film = sheet.film_um()[:, round(5 / cell_mm) : round(115 / cell_mm)].reshape(sheet.rows, -1)
     lines = [film[round((y - 0.6) / cell_mm) : round((y + 0.6) / cell_mm)].mean(0) for y in ways]
     power = sum(np.abs(np.fft.rfft((line - line.mean()) * np.hanning(line.size))) ** 2 for line in lines)
-    stride = rub.STEP * (2 * np.ceil(0.8 / cell_mm) + 1) * cell_mm
+    stride = bench.physics.step * 1.6
+    if not stride:
+        pytest.skip("cell by cell there is no rhythm")
     for contacts in (2, 3, 4, 5):
         at = round(film.shape[1] * cell_mm / (contacts * stride))
         assert power[at - 2 : at + 3].mean() < 2 * np.median(power[at - 25 : at + 26])
@@ -540,47 +591,97 @@ def test_a_long_stroke_flattens_a_sharp_tip(bench):
 
 
 def test_wear_goes_on_from_stroke_to_stroke(bench):
-    box = rub.Box(bench.palette, bench.physics, 0.1)
-    stroke = bench.stroke([[2, 2], [30, 2]], 5.0, tip=Tip("sharp", 2.4))
-    per_stroke = rub.SHARPEN_UM / 10 * np.pi / 4 * 2.4**2 / rub.worn_per_newton_mm(bench.physics)  # newton mm
-    once, ahead = np.array([per_stroke]), np.array([0])
-    taken = np.array([box.take([stroke], once, ahead) for _ in range(20)])[:, :, 0]
-    at_once = rub.Box(bench.palette, bench.physics, 0.1)
-    np.testing.assert_array_equal(at_once.take([stroke] * 20, once.repeat(20), ahead.repeat(20)), taken.T)
+    box, shape = Box(bench.palette, bench.physics, 0.1), Tip("sharp", 2.4)
+    stroke = bench.stroke([[2, 2], [30, 2]], 5.0, tip=shape)
+    per_stroke = flat_um(shape) / 10 * shape.area_mm2 / bench.physics.worn_per_newton_mm()  # newton mm
+    once, ahead = np.array([per_stroke * 1.001]), np.array([0])
+    taken = np.array([box.take([stroke], once, ahead) for _ in range(20)])[:, 0]
+    at_once = Box(bench.palette, bench.physics, 0.1)
+    np.testing.assert_array_equal(at_once.take([stroke] * 20, once.repeat(20), ahead.repeat(20)), taken)
     assert at_once.worn_um == box.worn_um
-    assert taken[:, 0].tolist() == [0] * 10 + [1] * 10  # then turned to a fresh face
-    assert (np.diff(taken[:10, 1]) >= 0).all() and len(set(taken[:10, 1])) == rub.WEAR_LEVELS  # flatter and flatter
-    assert taken[10, 1] == taken[0, 1] == 0
-    other = bench.stroke([[2, 2], [30, 2]], 5.0, "blue", Tip("sharp", 2.4))
+    flat = [int((box.masks[n] < 8).sum()) for n in taken]
+    assert (np.diff(flat[:10]) >= 0).all() and len(set(taken[:10])) == WEAR_LEVELS  # flatter and flatter
+    assert flat[9] > 1.5 * flat[0] and flat[10] < flat[9]  # then turned to a fresh face
+    assert set(taken[:10]).isdisjoint(taken[10:]) and box.sharpened["red"] == 2
+    other = bench.stroke([[2, 2], [30, 2]], 5.0, "blue", shape)
     assert box.worn_um.keys() == {("red", stroke.tip)}
     box.take([other], once, ahead)
     assert len(box.worn_um) == 2
 
 
-@pytest.mark.parametrize("cell_mm", [0.2, 0.1])
-def test_wear_is_planned_by_force_times_the_length_drawn(bench, cell_mm):
-    box = rub.Box(bench.palette, bench.physics, cell_mm)
-    sheet = bench.sheet(np.zeros((round(12 / cell_mm),) * 2), cell_mm)
-    strokes = [bench.stroke([[1, 1], [5, 1], [5, 3]], 2.0), bench.stroke([[11, 11], [7, 11]], 4.0)]
+def test_a_long_line_broadens_alike_as_one_stroke_and_as_many(bench):
+    """Until the tip is worn flat: then the plan has it turned, which nobody does within a stroke."""
+    if bench.physics.push == 0:
+        pytest.skip("Table 1 wears a tip by all that it gives, which its plan of usual means does not foresee")
+    shape, force = Tip("sharp", 4.0), 1.0
+    length = 0.97 * flat_um(shape) * shape.area_mm2 / bench.physics.worn_per_newton_mm() / force
+    broad = []
+    for pieces in (1, 20):
+        ends = np.linspace(3, 3 + length, pieces + 1)
+        sheet = bench.sheet(np.zeros((60, round((length + 6) / 0.1))))
+        um = force / (bench.physics.lam * np.pi / 4 * 16)
+        strokes = [bench.stroke([[a, 3], [b, 3]], um, tip=shape) for a, b in itertools.pairwise(ends)]
+        bench.draw(sheet, strokes, smears=False)
+        breadth = []
+        for share in (0.05, 0.6):
+            begin = round((3 + share * length) / 0.1)
+            film, across = sheet.film_um()[:, begin : begin + round(length)].mean(1), 0.1 * np.arange(60)
+            mean = (film * across).sum() / film.sum()
+            breadth.append(4 * np.sqrt((film * (across - mean) ** 2).sum() / film.sum()))
+        assert breadth[1] > 1.2 * breadth[0]
+        broad.append(breadth)
+    assert broad[1] == pytest.approx(broad[0], rel=0.15)
+
+
+@pytest.mark.parametrize("kind, width", [("blunt", 1.6), ("side", 8.0), ("rim", 4.0)])
+def test_wear_is_planned_by_force_times_the_length_drawn(bench, kind, width):
+    """... over the area of the tip: a side of 8 mm has 21 mm2, not the 50 of a disc."""
+    shape = Tip(kind, width)
+    box, sheet = Box(bench.palette, bench.physics, 0.1), bench.sheet(np.zeros((120, 120)))
+    strokes = [bench.stroke(p, 2.0, tip=shape) for p in ([[1, 1], [5, 1], [5, 3]], [[11, 11], [7, 11]])]
     rub.rub(sheet, strokes, box)
-    newton_mm = 6 * float(strokes[0].force_n[0]) + 4 * float(strokes[1].force_n[0])
-    worn_um = rub.worn_per_newton_mm(bench.physics) * newton_mm / (np.pi / 4 * 1.6**2)
+    newton_mm = 10 * float(strokes[0].force_n[0])
+    area = {"blunt": np.pi / 4 * 1.6**2, "side": 8 * 2.6, "rim": shape.area_mm2}[kind]
+    worn_um = bench.physics.worn_per_newton_mm() * newton_mm / area
     assert list(box.worn_um.values()) == pytest.approx([worn_um], rel=1e-3)
 
 
-def test_planned_wear_is_about_what_is_rubbed_off(bench):
+@pytest.mark.parametrize("um", [3.0, 8.0])
+def test_planned_wear_is_about_what_is_rubbed_off(bench, um):
     sheet = bench.felt(100, 200)
-    stroke = bench.stroke([[1, 5], [19, 5]], 3.0)
+    stroke = bench.stroke([[1, 5], [19, 5]], um)
     newton_mm = float(stroke.force_n[0]) * 18
     rubbed = bench.draw(sheet, [stroke]) * sheet.cell_mm**2 * bench.physics.wear
-    assert 0.2 < rub.worn_per_newton_mm(bench.physics) * newton_mm / rubbed < 5
+    assert 0.5 < bench.physics.worn_per_newton_mm() * newton_mm / rubbed < 2
+
+
+def test_a_crayon_draws_the_same_by_any_name(bench):
+    """The face of its tip goes by its place in the box."""
+    seen = []
+    for name in ("red", "a much longer name"):
+        crayons = tuple(replace(c, name=name) if c.name == "red" else c for c in bench.palette.crayons)
+        box = Box(replace(bench.palette, crayons=crayons), bench.physics, 0.1)
+        sheet = bench.felt(60, 80)
+        rub.rub(sheet, [bench.stroke([[1, 3], [7, 3]], 5.0, name)], box)
+        seen.append(sheet.total.copy())
+    np.testing.assert_array_equal(*seen)
+
+
+def test_tips_come_from_the_seed(bench):
+    masks = []
+    for seed in (0, 0, 1):
+        box = Box(bench.palette, bench.physics, 0.1, seed)
+        box.take([bench.stroke([[1, 3], [7, 3]], 5.0)], np.ones(1), np.zeros(1, np.int64))
+        masks.append(box.masks[0])
+    np.testing.assert_array_equal(masks[0], masks[1])
+    assert np.abs(masks[0] - masks[2])[masks[0] < ABSENT].max() > 1
 
 
 # ---- threads ----------------------------------------------------------------------------------------------
 
 
 def wax_bytes(sheet):
-    return b"".join(a.tobytes() for a in (sheet.total, sheet.count, sheet.crayon, sheet.layer, sheet.blend))
+    return b"".join(a.tobytes() for a in (sheet.total, sheet.used, sheet.crayon, sheet.layer, sheet.blend))
 
 
 def test_any_number_of_threads_gives_the_same_bytes(bench):
@@ -591,7 +692,7 @@ def test_any_number_of_threads_gives_the_same_bytes(bench):
         bench.draw(sheet, strokes, threads=threads)
         seen.add(wax_bytes(sheet))
     one_by_one = bench.felt(200, 200)
-    box = rub.Box(bench.palette, bench.physics, one_by_one.cell_mm)
+    box = Box(bench.palette, bench.physics, one_by_one.cell_mm)
     for stroke in strokes:
         rub.rub(one_by_one, [stroke], box)
     assert seen == {wax_bytes(one_by_one)}
@@ -608,4 +709,32 @@ def test_progress_and_loss_of_no_strokes(bench):
 
 def test_an_unknown_physics_is_named():
     with pytest.raises(ValueError, match="physics: 'oil' is none of metric"):
-        rub.physics("oil")
+        physics("oil")
+
+
+# ---- media --------------------------------------------------------------------------------------------------
+
+
+def test_media_differ_as_they_do_on_paper(crayons):
+    """Oil pastel gives most and reaches farthest, a pencil least; both show more colour in as much wax."""
+    films, drifts = {}, {}
+    for name in ("pencil", "metric", "oil-pastel"):
+        bench = Bench(physics(name), crayons)
+        sheet = bench.felt(100, 160)
+        bench.draw(sheet, [bench.stroke([[1, y], [15, y]], 8.0 * 0.05 / bench.physics.lam) for y in range(2, 9)])
+        films[name] = sheet.total.mean()
+        band = np.tile(np.abs(np.arange(160) - 80) < 8, 100)
+        old = bench.felt(100, 160)
+        old.total[band], old.used[band], old.layer[band, 0], old.crayon[band, 0] = 20, 1, 20, 2
+        bench.changed(rate_per_mm=0.0).draw(old, [bench.stroke([[1, y], [15, y]], 8.0) for y in range(1, 10)])
+        drifts[name] = (old.film_um().mean(0) * np.arange(160)).sum() / old.film_um().mean(0).sum()
+    assert films["pencil"] < 0.4 * films["metric"] < 0.4 * films["oil-pastel"] / 1.5
+    assert drifts["pencil"] < drifts["metric"] < drifts["oil-pastel"]
+    assert physics("pencil").pigment > physics("oil-pastel").pigment > physics("metric").pigment == 1
+
+
+def test_pigment_colours_the_wax_of_the_same_palette(bench):
+    k, s = Box(bench.palette, bench.physics, 0.1).optics()
+    more_k, more_s = Box(bench.palette, replace(bench.physics, pigment=3.0), 0.1).optics()
+    np.testing.assert_allclose(more_k, 3 * k)
+    np.testing.assert_allclose(more_s, 3 * s)

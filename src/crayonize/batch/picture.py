@@ -33,7 +33,7 @@ class Studio:
         """
         self._recipe = recipe
         if render is None:
-            from ..wax.rub import physics
+            from ..wax.physics import physics
 
             recipe.settings.parsed()
             physics(recipe.settings.physics)

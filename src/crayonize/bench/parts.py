@@ -267,7 +267,7 @@ def _staged(path: Path, megapixels: float) -> "tuple[dict[str, float], Drawing]"
 
 def _rubbed(side: int, smears: bool) -> float:
     """Cell-steps per second: two coats of lines, the second across the first."""
-    from ..wax import rub, tip
+    from ..wax import tip
 
     stand, edge = _blank(side, smears), TIP_CELLS
     ways = range(edge, side - edge + 1, round(0.62 * TIP_CELLS))
@@ -277,7 +277,7 @@ def _rubbed(side: int, smears: bool) -> float:
     drawn = [_stroke(line, stand, i // len(ways)) for i, line in enumerate(lines)]
     seconds = seconds_of(lambda: stand.draw(drawn))
     mask = stand.box.masks[0]
-    stride = max(1, rub.STEP * (mask.shape[0] - 2 * stand.box.reach))
+    stride = max(1, stand.box.constants.step * TIP_CELLS)
     contacts = len(lines) * round((side - 2 * edge) / stride)
     return contacts * int((mask < tip.ABSENT).sum()) / seconds
 

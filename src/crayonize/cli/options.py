@@ -9,7 +9,7 @@ from stroke_gen.checks import did_you_mean, printable
 
 from .. import __version__
 from ..images import metadata, page
-from ..settings import Settings
+from ..settings import MEDIA, Settings
 from . import folders
 
 _COMMANDS_HELP = """\
@@ -78,6 +78,13 @@ def photo_parser() -> Parser:
         "--force",
         default=Settings.force,
         help="light, normal, heavy or a factor, 0.1 to 5 (%(default)s)",
+    )
+    add(
+        "--medium",
+        dest="physics",
+        type=_medium,
+        default="crayon",
+        help="what is drawn with: crayon, oil-pastel or pencil (%(default)s)",
     )
     add("--age", type=_whole, help="of the one who draws in style child, 3 to 10")
     add("--left-handed", action="store_true", help="hatching leans the other way")
@@ -163,7 +170,7 @@ def _add_size(parser: Parser) -> None:
         type=_whole,
         help="at most so many at once; the picture stays the same (all cores)",
     )
-    add("--preview", action="store_true", help="quick: half the size, and no smearing")
+    add("--preview", action="store_true", help="quick: half the size")
     add("--no-light", dest="light", action="store_false", help="no shading of the relief")
 
 
@@ -171,6 +178,13 @@ def add_talk(parser: Parser) -> None:
     loudness = parser.add_mutually_exclusive_group()
     loudness.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors")
     loudness.add_argument("-v", "--verbose", action="count", default=0, help="tell seed and time")
+
+
+def _medium(word: str) -> str:
+    """The constants of what is drawn with, by the name that a user has for it."""
+    if word not in MEDIA:
+        raise argparse.ArgumentTypeError(f"{word!r} is no medium{did_you_mean(word, MEDIA)}")
+    return MEDIA[word]
 
 
 def _whole(text: str) -> int:

@@ -21,6 +21,8 @@ from ..light import optics
 from ..machine import cores, folder, kernels, source
 from ..settings import Settings
 from ..wax import paper, rub
+from ..wax.box import Box
+from ..wax.physics import physics as physics_of
 from ..wax.sheet import Sheet
 from .palette import Palette
 from .palette_files import load_palette, palette_names
@@ -36,13 +38,12 @@ SHIPPED = Path(__file__).parents[1] / "data" / "tables"
 def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
     """Hatch and measure every crayon of a palette on a paper."""
     crayons = palette.crayons
-    k = np.array([c.k for c in crayons], np.float32)
-    s = np.array([c.s for c in crayons], np.float32)
     grounds = _grounds(palette)
     rows, cols = len(grounds) * len(PRESSURES), len(crayons)
     shape = (round(rows * PATCH_MM / CELL_MM), round(cols * PATCH_MM / CELL_MM))
-    sheet = Sheet(paper.tooth(sheet_paper, *shape, CELL_MM, 0), CELL_MM, k, s)
-    constants = rub.physics(physics)
+    constants = physics_of(physics)
+    box = Box(palette, constants, CELL_MM)
+    sheet = Sheet(paper.tooth(sheet_paper, *shape, CELL_MM, 0), CELL_MM, *box.optics())
     base = paper.colour_linear(sheet_paper.colour)
     coats = [
         _hatching(row, col, ground[0], ground[1], 0)
@@ -50,14 +51,14 @@ def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: i
         for col in range(cols)
         if (ground := grounds[row // len(PRESSURES)])
     ]
-    rub.rub(sheet, coats, rub.Box(palette, constants, CELL_MM), threads=threads)
+    rub.rub(sheet, coats, box, threads=threads)
     before, _ = _means(optics.render(sheet, base, light=False, threads=threads), rows, cols)
     top = [
         _hatching(row, col, crayons[col].name, PRESSURES[row % len(PRESSURES)], 1)
         for row in range(rows)
         for col in range(cols)
     ]
-    rub.rub(sheet, top, rub.Box(palette, constants, CELL_MM), threads=threads)
+    rub.rub(sheet, top, Box(palette, constants, CELL_MM), threads=threads)
     after, grain = _means(optics.render(sheet, base, light=False, threads=threads), rows, cols)
     split = (len(grounds), len(PRESSURES), len(crayons), 3)
     a, b = _fit(before.reshape(split), after.reshape(split))
@@ -84,7 +85,7 @@ def _hatching(row: int, col: int, crayon: str, pressure: float, turn: int) -> St
     fine = np.concatenate([np.linspace(p, q, 12) for p, q in itertools.pairwise(turned)])
     inside = fine[(np.abs(fine) <= half - 0.6).all(1)]
     path = (inside + (np.array([col, row]) + 0.5) * PATCH_MM).astype(np.float32)
-    force = np.full(len(path), pressure * 0.785 * TIP.width_mm**2, np.float32)
+    force = np.full(len(path), pressure * TIP.area_mm2, np.float32)
     return Stroke(path, force, crayon, TIP)
 
 
@@ -137,7 +138,7 @@ def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: 
 
 def _key(palette: Palette, sheet_paper: paper.Paper, physics: str) -> str:
     """Changes with whatever the measured colours depend on."""
-    what = repr((palette.crayons, sheet_paper, rub.physics(physics), PRESSURES, TIP, SPACING, CELL_MM, rub.STEP))
+    what = repr((palette.crayons, sheet_paper, physics_of(physics), PRESSURES, TIP, SPACING, CELL_MM))
     return hashlib.sha256(what.encode()).hexdigest()[:12]
 
 

@@ -150,7 +150,8 @@ def colours(easel: "Easel") -> Frame:
         np.zeros((1, len(columns)), np.float32), 1.0, *np.split(easel.sheet.optics, 2, axis=1)
     )
     for cell, column in enumerate(columns):
-        sheet.count[cell] = len(column)
+        sheet.used[cell] = len(column)
+        sheet.total[cell] = sum(height for _, height in column)
         for layer, (crayon, height) in enumerate(column):
             sheet.crayon[cell, layer], sheet.layer[cell, layer] = crayon, height
     seen = optics.render(sheet, easel.ground, light=False)[0]

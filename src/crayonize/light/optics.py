@@ -16,7 +16,7 @@ from stroke_gen.jit import kernel
 
 from ..crayons.pigment import FRONT
 from ..images.icc import encode_srgb
-from ..wax.contact import BLEND, LAYERS
+from ..wax.columns import BLEND, LAYERS
 from ..wax.sheet import Sheet
 from . import area
 

@@ -2,7 +2,7 @@
 
 The kernels are those of `rub`, and so is the wax: strokes drawn here, saved, and drawn again come out the same.
 One thing `rub` knows that a hand does not tell when it puts the crayon down: which way the whole stroke goes,
-along which the tip's grooves lie (`rub.HEADINGS`). So the first half millimetre is waited for, and its way is
+along which the tip's grooves lie (`box.HEADINGS`). So the first half millimetre is waited for, and its way is
 taken. A stroke that bends later on may have its grooves turned a little when it is drawn again.
 """
 
@@ -19,8 +19,10 @@ from ..images.icc import encode_srgb
 from ..light import optics
 from ..pipeline import Easel
 from ..settings import Settings
-from .contact import _lift, _move, _press, window
-from .rub import STEP, _points, _ways, surroundings
+from .contact import Held, lift, move, press
+from .rub import table_of
+from .strokes import in_cells, ways
+from .window import window
 
 SETTLE_MM = 0.5  # length from which a stroke's heading is taken
 MARGIN = 2  # cells around a tip: one whose light changes with its neighbour's height, one for rounding
@@ -134,8 +136,8 @@ class _Hand:
     def __init__(self, easel: Easel, dab: Stroke) -> None:
         """dab: a stroke of one point, where the crayon is put down."""
         self.easel, self.dab = easel, dab
-        self._wax = np.uint8(easel.box.palette.index(dab.crayon))
-        self._around = surroundings(easel.sheet, easel.box, easel.smears)
+        self._wax = easel.box.palette.index(dab.crayon)
+        self._table = table_of(easel.sheet, easel.box, easel.smears)
         self._path, self._force = [dab.path_mm], [dab.force_n]
         self._drawn = 0  # number of the point up to which the stroke is drawn
         self._given = 0.0  # wax, in um times cells
@@ -150,8 +152,8 @@ class _Hand:
         self._path.append(path_mm)
         self._force.append(force)
         if not self.side:
-            points, first = _points([self.stroke()], self.easel.sheet.cell_mm)
-            if _ways(points, first)[1][0] * self.easel.sheet.cell_mm < SETTLE_MM:
+            points, first = in_cells([self.stroke()], self.easel.sheet.cell_mm)
+            if ways(points, first)[1][0] * self.easel.sheet.cell_mm < SETTLE_MM:
                 return points[:0]
             self._put_down()
         return self._draw()
@@ -161,7 +163,7 @@ class _Hand:
         if not self.side:
             self._put_down()
         points = self._draw()
-        self._given += _lift(*self._tip, points[-1], *self._around)
+        self._given += lift(self._desk, self._held, self._table, points[-1])
         self._book()
         return points
 
@@ -169,26 +171,25 @@ class _Hand:
         """Choose the tip for the way the stroke has begun, and press it on the sheet."""
         box, cell_mm = self.easel.box, self.easel.sheet.cell_mm
         stroke = self.stroke()
-        *_, self._heading = _ways(*_points([stroke], cell_mm))
-        taken, worn_um = box.take([stroke], np.zeros(1), self._heading)
-        mask = box.masks[taken[0]]
-        desk = window(mask.size, len(box.palette.crayons))
-        self.side = mask.shape[0]
-        present = _press(desk, mask.ravel(), worn_um[0], self.side, self.easel.sheet.cols)
-        self._tip = (desk, self._wax, self.side, box.reach, present)
+        *_, self._heading = ways(*in_cells([stroke], cell_mm))
+        (number,) = box.take([stroke], np.zeros(1), self._heading)
+        mask = box.masks[number]
+        self._desk, self.side = window(mask.size, len(box.palette.crayons)), mask.shape[0]
+        cols = self.easel.sheet.cols
+        self._held: Held = press(self._desk, mask.ravel(), self._wax, self.side, box.reach, cols)
 
     def _draw(self) -> Floats:
         """Draw on to the last point; returns in cells where the way began and all points passed."""
-        points, _ = _points([self.stroke(self._drawn)], self.easel.sheet.cell_mm)
+        points, _ = in_cells([self.stroke(self._drawn)], self.easel.sheet.cell_mm)
         for a, b in pairwise(points):
-            self._given += _move(*self._tip, a, b, np.float32(STEP), *self._around)
+            self._given += move(self._desk, self._held, self._table, a, b)
         self._drawn = len(self._path) - 1
         return points
 
     def _book(self) -> None:
         """Carry the stroke's wear on, and count its wax, as `rub` does."""
         box, cell_mm, stroke = self.easel.box, self.easel.sheet.cell_mm, self.stroke()
-        newton_cells, _, _ = _ways(*_points([stroke], cell_mm))
+        newton_cells, _, _ = ways(*in_cells([stroke], cell_mm))
         box.take([stroke], newton_cells * cell_mm, self._heading)
         box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + self._given * cell_mm**2 / 1000
 

@@ -7,26 +7,30 @@ long streaks along a stroke.
 """
 
 import functools
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from stroke_gen.drawing import Tip
+from stroke_gen.drawing import RIM_FROM, RIM_INNER, SIDE_MM, Tip
 
 ABSENT = np.float32(1e9)
 BUMP_UM = 10.0  # about a quarter of a drawing paper's tooth
 BUMP_MM = 0.75  # wavelength of the bumps across the crayon's way ...
 GROOVE = 8.0  # ... and how many times longer they are along it
-SIDE_MM = 2.6  # breadth of the strip on which a lying crayon touches the paper
 DROPS_UM = {"sharp": 110.0, "blunt": 32.0, "rim": 60.0, "side": 40.0}  # centre to edge
 
 
-def mask(tip: "Tip", cell_mm: float, rng: np.random.Generator, heading_rad: float = 0.0) -> NDArray[np.float32]:
-    """The mask of a fresh tip on a grid of `cell_mm`, with grooves along `heading_rad`, the way it moves.
+def mask(
+    tip: Tip,
+    cell_mm: float,
+    rng: np.random.Generator,
+    heading_rad: float = 0.0,
+    worn_um: float = 0.0,
+) -> NDArray[np.float32]:
+    """The mask of a tip on a grid of `cell_mm`, with grooves along `heading_rad`, the way it moves.
 
+    worn_um: mean height that has been rubbed off, which cuts its profile flat from below; the bumps come anew.
     Returns (n, n) float32 in um with n odd, the lowest present cell at 0.
     """
     if tip.kind not in DROPS_UM:
@@ -34,12 +38,30 @@ def mask(tip: "Tip", cell_mm: float, rng: np.random.Generator, heading_rad: floa
     if not 0 < tip.width_mm <= 100:
         raise ValueError(f"tip.width_mm: {tip.width_mm} is not between 0 and 100")
     shape, present = _shape(tip, cell_mm)
+    shape = np.maximum(shape - _level(shape[present], worn_um), 0)
     height = shape + BUMP_UM * _bumps(len(shape), _groove(BUMP_MM / cell_mm, heading_rad), rng)
     return np.where(present, height - height[present].min(), ABSENT).astype(np.float32)
 
 
+@functools.cache
+def flat_um(tip: Tip) -> float:
+    """Mean height to be rubbed off a fresh tip until it is flat to its full width."""
+    shape, present = _shape(tip, tip.width_mm / 64)
+    return max(float((shape[present].max() - shape[present]).mean()), 1e-3)
+
+
+def _level(heights: NDArray[np.float64], mean_um: float) -> float:
+    """At which height a tip is cut when a mean of `mean_um` of it is gone."""
+    rising = np.sort(heights)
+    number = np.arange(1, rising.size + 1)
+    lost = number * rising - np.cumsum(rising)  # summed, when cut at each of the heights
+    at = int(np.searchsorted(lost, mean_um * rising.size, "right"))
+    below = rising[:at]
+    return float((mean_um * rising.size + below.sum()) / at) if at else 0.0
+
+
 @functools.lru_cache(maxsize=8)
-def _shape(tip: "Tip", cell_mm: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _shape(tip: Tip, cell_mm: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Height in um of a tip without bumps, and which cells belong to it."""
     half = max(0.5 * tip.width_mm / cell_mm, 0.75)
     n = 2 * int(np.ceil(half)) + 1
@@ -52,7 +74,7 @@ def _shape(tip: "Tip", cell_mm: float) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def _profile(
-    tip: "Tip", along: NDArray[np.float64], across: NDArray[np.float64], radius: NDArray[np.float64]
+    tip: Tip, along: NDArray[np.float64], across: NDArray[np.float64], radius: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Height over the lowest point as a fraction of the drop, and which cells belong to the tip."""
     if tip.kind == "sharp":
@@ -60,7 +82,7 @@ def _profile(
     if tip.kind == "blunt":
         return radius**4, radius <= 1
     if tip.kind == "rim":  # the worn back end: one side of a ring touches, the hollow stays above
-        return (radius - 0.75) ** 2 * 4 + 0.6 * (1 - along), (radius <= 1) & (radius > 0.35) & (along > -0.3)
+        return (radius - 0.75) ** 2 * 4 + 0.6 * (1 - along), (radius <= 1) & (radius > RIM_INNER) & (along > RIM_FROM)
     breadth = max(SIDE_MM / tip.width_mm, 1e-3)
     return (across / breadth) ** 2, (np.abs(across) <= breadth) & (np.abs(along) <= 1)
 

@@ -1,0 +1,53 @@
+"""Strokes as the kernels take them: points in cells, and what must be known of each before it is drawn."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stroke_gen.drawing import Stroke
+from stroke_gen.jit import lean_kernel
+
+from . import box
+
+
+def in_cells(
+    strokes: Sequence[Stroke], cell_mm: float
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """All points as (x, y in cells, force), and where each stroke begins."""
+    first = np.zeros(len(strokes) + 1, np.int64)
+    np.cumsum([len(s.path_mm) for s in strokes], out=first[1:])
+    points = np.empty((int(first[-1]), 3), np.float32)
+    points[:, :2] = np.concatenate([s.path_mm for s in strokes])
+    points[:, :2] /= cell_mm
+    points[:, 2] = np.concatenate([s.force_n for s in strokes])
+    return points, first
+
+
+def ways(
+    points: NDArray[np.float32], first: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Of each stroke: force times length (newton cells), length in cells, and its mean direction.
+
+    Directions count alike to and fro, and are given as one of box.HEADINGS.
+    """
+    newton_cells, cells, double = np.zeros((3, len(first) - 1))
+    _measure(points, first, newton_cells, cells, double)
+    return newton_cells, cells, np.round(double / (2 * np.pi) * box.HEADINGS).astype(np.int64) % box.HEADINGS
+
+
+@lean_kernel
+def _measure(points, first, newton_cells, cells, double):  # type: ignore[no-untyped-def]
+    """Force times length, length, and twice the angle of the mean direction of each stroke."""
+    for s in range(newton_cells.size):
+        along, across = 0.0, 0.0
+        for i in range(first[s], first[s + 1] - 1):
+            dx = np.float64(points[i + 1, 0] - points[i, 0])
+            dy = np.float64(points[i + 1, 1] - points[i, 1])
+            step = np.sqrt(dx * dx + dy * dy)
+            newton_cells[s] += step * points[i, 2]
+            cells[s] += step
+            if step > 0:
+                along += (dx * dx - dy * dy) / step
+                across += 2 * dx * dy / step
+        double[s] = np.arctan2(across, along)
