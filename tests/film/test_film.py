@@ -309,14 +309,8 @@ def test_command_films_a_photo(tmp_path):
     ]
     assert cli.main([str(word) for word in words]) == 0
     with Image.open(tmp_path / "a.png.webp") as moving, Image.open(tmp_path / "a.png") as picture:
-        # Of 23; where a stage of the generator draws nothing, they are one.
-        assert moving.n_frames > 12
-        took = 0
-        for number in range(moving.n_frames):
-            moving.seek(number)
-            moving.load()
-            took += moving.info["duration"]
-        assert took == 4000
+        assert moving.n_frames > 15
+        moving.seek(moving.n_frames - 1)
         ends = np.asarray(moving.convert("RGB")).astype(int), np.asarray(picture).astype(int)
     assert np.abs(ends[0] - ends[1]).mean() < 9
 
