@@ -99,15 +99,14 @@ def test_damaged_or_endless_metadata_is_left_out(desk: Desk, memory_photo: Path)
 
 @pytest.mark.parametrize(
     "page, dpi, shape, wanted",
-    [("a4", 300, (4000, 2000), (297, 3508)), ("a4", None, (3000, 4000), (280, 3307)), ("a4", 150, (10,
-     10), (210, 1240)),
-     ("letter", 300, (4, 3), (279.4, 3300)), (None, 100, (3, 2), (297, 1169)), (None, None, (3, 2), (297,
-     1600))],
+    [("a4", 300, (4000, 2000), (297, 3508)), ("a4", None, (3000, 4000), (280, 3307)),
+     ("a4", 150, (10, 10), (210, 1240)), ("letter", 300, (4, 3), (279.4, 3300)),
+     (None, 100, (3, 2), (297, 1169)), (None, None, (3, 2), (297, 1600))],
 )  # fmt: skip
 def test_pages(
     page: str | None, dpi: float | None, shape: tuple[int, int], wanted: tuple[float, int]
 ) -> None:
-    settings = fitted(Settings(), page, dpi, *shape)
+    settings = fitted(Settings(sheet_mm=297.0), page, dpi, *shape)
     assert (settings.sheet_mm, settings.size) == pytest.approx(wanted)
 
 

@@ -294,8 +294,8 @@ def test_command_films_a_saved_drawing_and_adds_its_legend(scribble, tmp_path):
 
 
 def test_command_films_a_photo(tmp_path):
-    patches = np.random.default_rng(1).integers(20, 230, (4, 6, 3)).astype(np.uint8)
-    photo = np.kron(patches, np.ones((10, 10, 1), np.uint8))
+    photo = np.full((40, 60, 3), 230, np.uint8)
+    photo[10:30, 20:40] = (200, 40, 30)
     Image.fromarray(photo).save(tmp_path / "photo.png")
     words = [
         tmp_path / "photo.png",
