@@ -29,6 +29,7 @@ GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
 DARK_PRICE = 0.2  # for a crayon darker than the surface's darkest, times the difference of lightness
 BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
+DARK_BODY = 0.46  # OKLab L below which skin and hair are dark
 WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
 BEAM = 3  # mixtures of each length that are tried with one crayon more
@@ -166,7 +167,9 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     skin, hair = (np.bincount(seen.family.ravel(), m.ravel()) / np.bincount(seen.family.ravel())
                   for m in (seen.skin, seen.hair))  # fmt: skip
     extra = prices(sample, swatches) + np.float32(LAYER_PRICE)
-    extra += BODY_PRICE * (skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD))
+    body = skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD)
+    dark = np.clip((DARK_BODY - sample[:, 0].mean(1)) / 0.08, 0, 1)
+    extra += BODY_PRICE * body * (1 - np.outer(dark, blackness(swatches)))
     every, table = np.ones(len(order), np.bool_), wax(swatches)
 
     def tried(mixtures: Ints, allowed: NDArray[np.bool_], pressures: Ints) -> Floats:
@@ -234,9 +237,15 @@ def foreign(swatches: Swatches, width_rad: float) -> Floats:
     warm = (hue[:, 1] * np.cos(WARM) + hue[:, 2] * np.sin(WARM)) / (chroma + 1e-6)
     off = np.clip((np.arccos(np.clip(warm, -1, 1)) - width_rad) / 0.5, 0, 1)
     grey = np.clip(1 - chroma / 0.05, 0, 1)
-    light = np.clip((hue[:, 0] - 0.85) / 0.1, 0, 1)  # white is at home everywhere, and so is
-    dark = np.clip((0.48 - hue[:, 0]) / 0.08, 0, 1) * np.clip(2 - chroma / 0.06, 0, 1)  # what is as good as black
-    return (np.maximum(off * (1 - grey), grey * (1 - light)) * (1 - dark)).astype(np.float32)
+    light = np.clip((hue[:, 0] - 0.85) / 0.1, 0, 1)  # white is at home everywhere
+    return np.maximum(off * (1 - grey), grey * (1 - light)).astype(np.float32)
+
+
+def blackness(swatches: Swatches) -> Floats:
+    """How nearly black each crayon (crayons,) is; the darkest skin and hair may take it, lighter ones must not."""
+    heavy = oklab(swatches.over(swatches.paper))[:, -1]
+    colourless = np.clip(2 - np.hypot(heavy[:, 1], heavy[:, 2]) / 0.06, 0, 1)
+    return (np.clip((0.45 - heavy[:, 0]) / 0.08, 0, 1) * colourless).astype(np.float32)
 
 
 def clash(one: Floats, other: Floats) -> Floats:
