@@ -16,13 +16,15 @@ HEAVY = ("numpy", "numba", "cv2", "PIL", "skimage", "scipy")
 
 def modules_after(code):
     """Names of the packages that a fresh process has loaded after running `code`."""
-    script = f"import sys\n{code}\nprint('\\n'.join({{m.partition('.')[0] for m in sys.modules}}), file=sys.stderr)"
+    names = "{m.partition('.')[0] for m in sys.modules}"
+    script = f"import sys\n{code}\nprint('\\n'.join({names}), file=sys.stderr)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     return set(run.stderr.split())
 
 
 @pytest.mark.parametrize("words", [
-    ["--help"], ["--version"], ["draw", "--help"], ["warmup", "--help"], ["palettes"], ["styles"], ["papers"],
+    ["--help"], ["--version"], ["draw", "--help"], ["warmup", "--help"], ["palettes"],
+    ["styles"], ["papers"],
     ["bench", "--help"], ["bench", "--json", "/missing/all.json"],
     ["photo.jpg", "--palete", "box8"], ["photo.jpg", "--seed", "x"],
 ], ids=" ".join)  # fmt: skip

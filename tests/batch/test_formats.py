@@ -143,7 +143,8 @@ from crayonize.batch.conductor import run
 from crayonize.batch.job import Recipe
 from crayonize.batch.options import Options
 from crayonize.settings import Settings
-assert run([{str(tmp_path / "in")!r}], {str(tmp_path / "out")!r}, Options(quiet=True), Recipe(Settings()),
+assert run([{str(tmp_path / "in")!r}], {str(tmp_path / "out")!r},
+           Options(quiet=True), Recipe(Settings()),
            render="stand_in:sketch") == 0
 assert not {{"numpy", "PIL", "cv2", "numba"}} & {{name.partition(".")[0] for name in sys.modules}}
 """

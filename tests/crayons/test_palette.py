@@ -18,10 +18,10 @@ from stroke_gen.checks import did_you_mean, quoted
 DATA = Path(load_palette.__code__.co_filename).parents[1] / "data" / "palettes"
 NAMES = [name for name, _, _ in palette_names()]
 BOXES = ["box8", "box16", "box24", "box48", "box64"]
-BRANDS = """crayola, tickle me, bluetiful, macaroni, granny smith, timberwolf, tumbleweed, mauvelous, robin,
-razzmatazz, cerulean, dandelion, purple mountain, inchworm, jazzberry, manatee, fuzzy wuzzy, outer space,
-laser lemon, screamin, atomic, pacific blue, wild strawberry, bittersweet, asparagus, carnation, cadet,
-wisteria, shamrock, cornflower"""
+BRANDS = """crayola, tickle me, bluetiful, macaroni, granny smith, timberwolf, tumbleweed,
+mauvelous, robin, razzmatazz, cerulean, dandelion, purple mountain, inchworm, jazzberry, manatee,
+fuzzy wuzzy, outer space, laser lemon, screamin, atomic, pacific blue, wild strawberry, bittersweet,
+asparagus, carnation, cadet, wisteria, shamrock, cornflower"""
 
 
 def linear(value: float) -> float:

@@ -211,7 +211,8 @@ def test_a_numba_without_one_of_its_inner_names_costs_only_the_cache(name, tmp_p
     code = f"""
 import builtins
 def without(module, globals=None, locals=None, names=(), level=0, real=builtins.__import__):
-    if (globals or {{}}).get("__name__") == "crayonize.machine.kernels" and {name!r} in (names or ()):
+    ours = (globals or {{}}).get("__name__") == "crayonize.machine.kernels"
+    if ours and {name!r} in (names or ()):
         raise ImportError({name!r})
     return real(module, globals, locals, names, level)
 builtins.__import__ = without

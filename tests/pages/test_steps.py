@@ -156,7 +156,10 @@ def test_what_cannot_be_is_refused(drawing, tmp_path):
 
 
 def test_command_makes_pages_from_lines_of_another_program(tmp_path, capsys):
-    shape = '<rect x="10" y="10" width="60" height="30" fill="red"/><path stroke="blue" fill="none" d="M0 45H100"/>'
+    shape = (
+        '<rect x="10" y="10" width="60" height="30" fill="red"/>'
+        '<path stroke="blue" fill="none" d="M0 45H100"/>'
+    )
     (tmp_path / "a.svg").write_text(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 50">{shape}</svg>'
     )

@@ -153,14 +153,20 @@ INK = 'fill="none" stroke="black"'
     (f'<rect {INK} x="10" y="10" width="80" height="30" rx="5"/>', [10, 10, 90, 40]),
     (f'<circle {INK} cx="50" cy="25" r="15"/>', [35, 10, 65, 40]),
     (f'<ellipse {INK} cx="50" cy="25" rx="40" ry="15"/>', [10, 10, 90, 40]),
-    (f'<g transform="translate(10 10)"><g transform="scale(2)"><path {INK} d="M0 0L40 15"/></g></g>', [10, 10, 90, 40]),
+    (f'<g transform="translate(10 10)"><g transform="scale(2)">'
+     f'<path {INK} d="M0 0L40 15"/></g></g>', [10, 10, 90, 40]),
     (f'<path transform="rotate(90 50 25)" {INK} d="M40 25H60"/>', [50, 15, 50, 35]),
-    (f'<defs><path id="a" {INK} d="M0 0L80 30"/></defs><use href="#a" x="10" y="10"/>', [10, 10, 90, 40]),
-    (f'<symbol id="a"><path {INK} d="M0 0L80 30"/></symbol><use xlink:href="#a" x="10" y="10"/>', [10, 10, 90, 40]),
-    (f'<svg x="10" y="10" width="80" height="30" viewBox="0 0 8 3"><path {INK} d="M0 0L8 3"/></svg>', [10, 10, 90, 40]),
-    (f'<clipPath><path {INK} d="M0 0L99 9"/></clipPath><path {INK} d="M10 10L90 40"/>', [10, 10, 90, 40]),
+    (f'<defs><path id="a" {INK} d="M0 0L80 30"/></defs>'
+     '<use href="#a" x="10" y="10"/>', [10, 10, 90, 40]),
+    (f'<symbol id="a"><path {INK} d="M0 0L80 30"/></symbol>'
+     '<use xlink:href="#a" x="10" y="10"/>', [10, 10, 90, 40]),
+    (f'<svg x="10" y="10" width="80" height="30" viewBox="0 0 8 3">'
+     f'<path {INK} d="M0 0L8 3"/></svg>', [10, 10, 90, 40]),
+    (f'<clipPath><path {INK} d="M0 0L99 9"/></clipPath>'
+     f'<path {INK} d="M10 10L90 40"/>', [10, 10, 90, 40]),
     (f'<path {INK} d="M10 10L90 40 nonsense 99"/>', [10, 10, 90, 40]),
-], ids=lambda value: re.sub("[^A-Za-z ]+", " ", value)[:30] if isinstance(value, str) else "")  # fmt: skip
+], ids=lambda value: re.sub("[^A-Za-z ]+", " ", value)[:30]
+   if isinstance(value, str) else "")  # fmt: skip
 def test_shapes_come_in(read, body, wanted):
     drawing = read(body, sheet_mm=100.0)
     assert (drawing.width_mm, drawing.height_mm) == (100, 50)
@@ -197,7 +203,8 @@ def test_lines_are_cut_off_beside_the_sheet(read):
 
 
 @pytest.mark.parametrize("text", [
-    "M1 2 A 5 3 20 0 1 9 9", "M1 2 a 5 3 -40 1 0 3 3", "M0 0 A 1 1 0 0 1 9 0", "M0 0a5 5 0 1110 0z m3 3 1 1",
+    "M1 2 A 5 3 20 0 1 9 9", "M1 2 a 5 3 -40 1 0 3 3", "M0 0 A 1 1 0 0 1 9 0",
+    "M0 0a5 5 0 1110 0z m3 3 1 1",
     "M1 1C2 2 3 0 4 1S6 3 7 1Q8 0 9 1T11 1H0V9Z", "M.5.5-1-1e1,2 3",
 ])  # fmt: skip
 def test_paths_are_read_as_another_library_reads_them(text):
@@ -230,7 +237,8 @@ def test_transforms_multiply_in_order():
     ('<path d="M0 9H9" stroke="rgb(250, 250, 0)"/>', "yellow"),
     ('<path d="M0 9H9" style="stroke:#080"/>', "green"),
     ('<style>.a, path {stroke: none} .a {stroke: red}</style><path class="a" d="M0 9H9"/>', "red"),
-    ('<style>/* } */ #b {stroke: red !important}</style><path id="b" stroke="blue" d="M0 9H9"/>', "red"),
+    ('<style>/* } */ #b {stroke: red !important}</style>'
+     '<path id="b" stroke="blue" d="M0 9H9"/>', "red"),
     ('<g stroke="red"><g stroke="inherit"><path d="M0 9H9"/></g></g>', "red"),
     ('<g color="red"><path stroke="currentColor" d="M0 9H9"/></g>', "red"),
     ('<linearGradient id="g"><stop stop-color="red"/><stop stop-color="#d00"/></linearGradient>'
@@ -434,7 +442,10 @@ def test_hostile_file_gets_one_line_quickly(name, tmp_path):
 
 
 def test_ordinary_doctype_is_no_harm(tmp_path):
-    kind = '<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">'
+    kind = (
+        '<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" '
+        '"http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">'
+    )
     (tmp_path / "a.svg").write_text(f'{kind}{BOX}<path {INK} d="M0 9H9"/></svg>')
     assert len(load_svg(tmp_path / "a.svg").strokes) == 1
 

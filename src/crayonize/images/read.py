@@ -89,7 +89,7 @@ class Photo:
         with _named(self._name):
             light = _light(self._scan(), max_side, ground)
         if self._picture is not None:
-            # Not before it is decoded: Pillow decodes a PNG to find them, and an error would be lost.
+            # Not before it is decoded: Pillow decodes a PNG for them, and an error would be lost.
             with suppress(Exception):  # broken EXIF raises nearly anything
                 self.exif = self._picture.getexif()
             if not isinstance(self.source, Image.Image):
