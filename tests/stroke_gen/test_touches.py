@@ -93,7 +93,6 @@ def test_every_shape_asked_for_is_as_large_as_the_least():
         assert number > 1 and stats[1:, 4].min() >= COAT.least * CELLS**2
 
 
-@pytest.mark.xfail(strict=True, reason="a crayon asked for somewhere is drawn wherever it gains, without any detail")
 def test_only_where_the_photo_has_detail():
     detail = np.zeros(SHAPE, np.float32)
     detail[:, :69] = 0.5
