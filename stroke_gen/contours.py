@@ -29,6 +29,7 @@ SCALE = 2  # edge pixels per work cell
 BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
 DARKER = 0.16  # OKLab L by which a line is darker than what it bounds
 LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
+STRAIGHT = 0.7  # of its length a line must reach, or it is worth less
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
 TAPER = 4.0  # tips over which a line begins and ends
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
@@ -136,6 +137,9 @@ def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: f
     who = scene.subject.mask
     care = _means(_sample(scene.care, fair.points), fair.first)
     rim = _means(np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)), fair.first)
+    reach = np.linalg.norm(fair.points[fair.first[1:] - 1] - fair.points[fair.first[:-1]], axis=1)
+    if factor == 1:  # worms and curls along fringes say nothing; an area's ring comes back to where it began
+        mean = mean * np.clip(reach / np.diff(fair.first) / STRAIGHT, 0, 1)
     worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
     return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.08))
 

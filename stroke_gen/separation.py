@@ -19,7 +19,7 @@ from .swatches import Swatches
 
 Floats = NDArray[np.float32]
 SHARP = np.float32(1 / 0.012)  # how quickly a dearer choice loses its say, per OKLab unit
-EFFORT = np.float32(0.002)  # OKLab units a level of pressure must be worth
+WORTH = np.float32(0.008)  # OKLab units: a crayon that makes less difference is pressed less, or not taken
 FAINT = 0.45  # of the lightest pressure of the table: below it the hand stays away
 
 
@@ -42,23 +42,25 @@ def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp
     count, levels = crayons.size, pressures.size
     total = levels**count
     colour, price = np.empty((total, 3), np.float32), np.empty(total, np.float32)
-    cost, mean, work = np.empty(total, np.float32), np.empty(count, np.float32), np.empty(total, np.float32)
-    for m in range(total):
-        rest, step, work[m] = m, total // levels, 0
-        for _ in range(count):
-            work[m] += pressures[rest // step]
-            rest %= step
-            step = max(step // levels, 1)
+    cost, mean, without = np.empty(total, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
     for i in range(cells.size):
         at = cells[i]
         if i == 0 or not same:
             combine(ground[at], crayons, pressures, wax, colour, price)
+        # What each choice costs, and the least that can be had without each of the crayons.
         least = np.float32(np.inf)
+        without[:] = np.inf
         for m in range(total):
             dl, da, db = colour[m, 0] - aim[at, 0], colour[m, 1] - aim[at, 1], colour[m, 2] - aim[at, 2]
-            off = np.sqrt(dl * dl + da * da + db * db) + dark_price * max(np.float32(0), -dl)
-            cost[m] = off + price[m] + EFFORT * work[m]
+            cost[m] = np.sqrt(dl * dl + da * da + db * db) + price[m] + dark_price * max(np.float32(0), -dl)
             least = min(least, cost[m])
+            rest, step = m, total // levels
+            for n in range(count):
+                if rest < step:  # the first of the pressures, which is none
+                    without[n] = min(without[n], cost[m])
+                rest %= step
+                step = max(step // levels, 1)
+        # The mean of the choices that are nearly as good as the best.
         mean[:] = 0
         all_ = np.float32(0)
         for m in range(total):
@@ -72,7 +74,8 @@ def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp
                     rest %= step
                     step = max(step // levels, 1)
         for n in range(count):
-            level[n, i] = mean[n] / all_
+            worth = min((without[n] - least) / WORTH, np.float32(1))
+            level[n, i] = worth * mean[n] / all_
 
 
 def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict[int, Floats]:
