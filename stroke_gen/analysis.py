@@ -1,6 +1,7 @@
 """Reading the photo: colours that crayons can give, structure, detail.
 
-All maps live on the work grid, a few cells to a crayon's width, whatever the size of photo and sheet.
+All maps live on the work grid, a few cells to a crayon's width, whatever the size of photo and
+sheet.
 """
 
 import cv2
@@ -37,7 +38,9 @@ def blur(image: Floats, sigma: float) -> Floats:
     """Gaussian blur, edges reflected; sigma in cells."""
     if sigma < 0.3:
         return image
-    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_REFLECT), np.float32)
+    return np.asarray(
+        cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_REFLECT), np.float32
+    )
 
 
 def wide_blur(image: Floats, sigma: float) -> Floats:
@@ -59,10 +62,11 @@ def far(linear: Floats) -> Floats:
 
 
 def structure(lab: Floats, tip: float) -> Floats:
-    """Cosine and sine (h, w, 3) of the double angle along the form, times its energy, and the energy.
+    """Cosine and sine (h, w, 3) of the double angle along the form, times its energy, and the
+    energy.
 
-    A colour structure tensor at two scales, the finest a tip's: strong gradients speak far into flat areas, and
-    what is finer than a stroke says nothing about where strokes run.
+    A colour structure tensor at two scales, the finest a tip's: strong gradients speak far into
+    flat areas, and what is finer than a stroke says nothing about where strokes run.
     """
     smooth = blur(lab, 0.5 * tip)
     gx, gy = _scharr(smooth, 1, 0), _scharr(smooth, 0, 1)
@@ -81,11 +85,15 @@ def _sum(image: Floats) -> Floats:
 
 def _scharr(image: Floats, dx: int, dy: int) -> Floats:
     """Scharr derivative, edges reflected, in units per cell."""
-    return np.asarray(cv2.Scharr(image, cv2.CV_32F, dx, dy, scale=1 / 32, borderType=cv2.BORDER_REFLECT), np.float32)
+    return np.asarray(
+        cv2.Scharr(image, cv2.CV_32F, dx, dy, scale=1 / 32, borderType=cv2.BORDER_REFLECT),
+        np.float32,
+    )
 
 
 def calmed(linear: Floats, radius: int) -> Floats:
-    """Kuwahara's filter: each place takes the mean of the quietest of the four windows it is a corner of.
+    """Kuwahara's filter: each place takes the mean of the quietest of the four windows it is a
+    corner of.
 
     Texture goes, borders stay and the half-tones along them vanish, so no grey rims are drawn.
     """
@@ -93,23 +101,38 @@ def calmed(linear: Floats, radius: int) -> Floats:
     brightness = _sum(linear)
     quiet, out = np.full(brightness.shape, np.inf, np.float32), linear.copy()
     for anchor in ((0, 0), (radius, 0), (0, radius), (radius, radius)):
-        mean, square = (cv2.boxFilter(m, cv2.CV_32F, (side, side), anchor=anchor) for m in (brightness, brightness**2))
+        mean, square = (
+            cv2.boxFilter(m, cv2.CV_32F, (side, side), anchor=anchor)
+            for m in (brightness, brightness**2)
+        )
         spread = square - mean * mean
         quieter = spread < quiet
         np.copyto(quiet, spread, where=quieter)
-        cv2.copyTo(cv2.boxFilter(linear, cv2.CV_32F, (side, side), anchor=anchor), quieter.astype(np.uint8), out)
+        cv2.copyTo(
+            cv2.boxFilter(linear, cv2.CV_32F, (side, side), anchor=anchor),
+            quieter.astype(np.uint8),
+            out,
+        )
     return out
 
 
 def unframed(linear: Floats) -> Floats:
-    """The outermost cells replaced by their inner neighbours: scans have dark rims that nobody would draw."""
+    """The outermost cells replaced by their inner neighbours: scans have dark rims that nobody
+    would draw.
+    """
     rim = max(1, round(RIM * max(linear.shape)))
     inner = linear[rim:-rim, rim:-rim]
-    return np.pad(inner, ((rim, rim), (rim, rim), (0, 0)), mode="edge") if min(inner.shape[:2]) > rim else linear
+    return (
+        np.pad(inner, ((rim, rim), (rim, rim), (0, 0)), mode="edge")
+        if min(inner.shape[:2]) > rim
+        else linear
+    )
 
 
 def detail(lab: Floats, tip: float) -> Floats:
-    """Where a sharpened tip is worth taking: fine local contrast that rises over its surroundings."""
+    """Where a sharpened tip is worth taking: fine local contrast that rises over its
+    surroundings.
+    """
     fine = np.sqrt(blur(_sum((lab - blur(lab, 0.8 * tip)) ** 2), 0.6 * tip))
     around = wide_blur(fine, 6 * tip)
     level = np.clip(fine / (0.03 + around) - 0.4, 0, 1.2) / 1.2 * np.clip(fine / 0.06, 0, 1)
@@ -124,25 +147,38 @@ def turned(tangent: Floats, degrees: np.float32 | Floats) -> Floats:
 
 
 def _toe(lightness: Floats, low: float, darkest: float) -> Floats:
-    """Lightness that stays as it is from KNEE above `darkest` and is drawn together below, `low` to `darkest`."""
+    """Lightness that stays as it is from KNEE above `darkest` and is drawn together below, `low` to
+    `darkest`.
+    """
     knee = darkest + KNEE
     if low >= darkest:
         return lightness
     depth = np.clip((knee - lightness) / (knee - low), 0, 1)
-    return np.where(depth > 0, knee - KNEE * (1 - (1 - depth) ** ((knee - low) / KNEE)), lightness).astype(np.float32)
+    return np.where(
+        depth > 0, knee - KNEE * (1 - (1 - depth) ** ((knee - low) / KNEE)), lightness
+    ).astype(np.float32)
 
 
 def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
-    """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in order."""
-    given = np.append(swatches.lightness(), oklab(swatches.paper)[0])  # on dark paper crayons are the light
+    """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in
+    order.
+    """
+    # on dark paper crayons are the light
+    given = np.append(swatches.lightness(), oklab(swatches.paper)[0])
     darkest, lightest = float(given.min()), float(given.max())
     out = lab.copy()
-    out[..., 0] = np.minimum(_toe(lab[..., 0], float(np.percentile(lab[..., 0], 0.5)), darkest), lightest)
+    out[..., 0] = np.minimum(
+        _toe(lab[..., 0], float(np.percentile(lab[..., 0], 0.5)), darkest), lightest
+    )
     out[..., 0] += 4 * style.lift * out[..., 0] * (1 - out[..., 0])
     chroma = np.hypot(lab[..., 1], lab[..., 2])
-    white = np.clip((out[..., 0] - WHITE) / (lightest - WHITE - 0.03), 0, 1) * np.clip(2 - chroma / 0.03, 0, 1)
+    white = np.clip((out[..., 0] - WHITE) / (lightest - WHITE - 0.03), 0, 1) * np.clip(
+        2 - chroma / 0.03, 0, 1
+    )
     out[..., 0] += white * white * (3 - 2 * white) * (lightest - out[..., 0])
-    warm = np.clip((lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1)
+    warm = np.clip(
+        (lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1
+    )
     shy = np.exp(-((chroma / 0.18) ** 2)) * np.clip(chroma / 0.05, 0, 1)
     out[..., 1:] *= (style.chroma * (1 + style.skin * warm**2 * shy))[..., None]
     return out

@@ -15,7 +15,8 @@ TO_LMS = np.array(
 TO_LAB = np.array(
     [[0.2104542553, 0.7936177850, -0.0040720468],
      [1.9779984951 * CHROMA, -2.4285922050 * CHROMA, 0.4505937099 * CHROMA],
-     [0.0259040371 * CHROMA, 0.7827717662 * CHROMA, -0.8086757660 * CHROMA]], np.float32)  # fmt: skip
+     [0.0259040371 * CHROMA, 0.7827717662 * CHROMA, -0.8086757660 * CHROMA]],
+    np.float32)  # fmt: skip
 
 
 def oklab(linear: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -27,11 +28,15 @@ def oklab(linear: NDArray[np.float32]) -> NDArray[np.float32]:
 def from_oklab(lab: NDArray[np.float32]) -> NDArray[np.float32]:
     """Linear RGB in [0, 1] of OKLab with a and b doubled; out of gamut is clipped."""
     lms = lab @ np.linalg.inv(TO_LAB.astype(np.float64)).T.astype(np.float32)
-    return np.clip(lms**3 @ np.linalg.inv(TO_LMS.astype(np.float64)).T.astype(np.float32), 0, 1).astype(np.float32)
+    return np.clip(
+        lms**3 @ np.linalg.inv(TO_LMS.astype(np.float64)).T.astype(np.float32), 0, 1
+    ).astype(np.float32)
 
 
 def cube_root(x):  # type: ignore[no-untyped-def]
-    """Cube root for kernels, x in 0..1, to 1e-4: a first guess from the float's bits, two Newton steps."""
+    """Cube root for kernels, x in 0..1, to 1e-4: a first guess from the float's bits, two Newton
+    steps.
+    """
     if x < np.float32(1e-7):
         return np.float32(0)
     y = np.int32(np.float32(x).view(np.int32) // 3 + 709921077).view(np.float32)

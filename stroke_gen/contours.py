@@ -1,7 +1,7 @@
 """Outlines: the few lines that matter, in the darkest crayon that fits, with a sharpened edge.
 
-Chains of edge pixels come from OpenCV's EdgeDrawing on the lightness; they are faired, ranked by length,
-contrast and detail, and drawn as far as the style's budget of line goes.
+Chains of edge pixels come from OpenCV's EdgeDrawing on the lightness; they are faired, ranked by
+length, contrast and detail, and drawn as far as the style's budget of line goes.
 """
 
 import math
@@ -52,8 +52,12 @@ class Lines:
         return Lines(self.points[at], first, self.contrast[at], self.worth[chosen])
 
 
-def outlines(plan: Plan, now: Floats, inside: Floats, style: Style, rng: np.random.Generator) -> list[Stroke]:
-    """Outline strokes for a plan whose sheet shows `now` (h, w, 3), `inside` its margin, light crayons first."""
+def outlines(
+    plan: Plan, now: Floats, inside: Floats, style: Style, rng: np.random.Generator
+) -> list[Stroke]:
+    """Outline strokes for a plan whose sheet shows `now` (h, w, 3), `inside` its margin, light
+    crayons first.
+    """
     scene, box = plan.scene, plan.swatches
     if style.lines <= 0:
         return []
@@ -61,9 +65,12 @@ def outlines(plan: Plan, now: Floats, inside: Floats, style: Style, rng: np.rand
     width = tip.width_mm / scene.cell_mm
     lightness = blur(scene.lab[..., 0], max(0.3 * width, 0.7))
     lines = _edges(scene, lightness, width)
-    if style.closed:  # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
+    # edges then only fill in what the areas' outlines leave: eyes, mouths, small things
+    if style.closed:
         small = _means(_sample(scene.detail, lines.points), lines.first) > 0.45
-        lines = _together(_areas(scene, scene.label, lightness, width), lines.only(np.flatnonzero(small)))
+        lines = _together(
+            _areas(scene, scene.label, lightness, width), lines.only(np.flatnonzero(small))
+        )
     lines = lines.only(np.flatnonzero(_means(_sample(inside, lines.points), lines.first) > 0.98))
     order = np.argsort(-lines.worth, kind="stable")
     length = np.cumsum(np.diff(lines.first)[order])
@@ -73,8 +80,12 @@ def outlines(plan: Plan, now: Floats, inside: Floats, style: Style, rng: np.rand
     for k in sorted(set(crayon.tolist()), key=lambda k: -box.lightness()[k]):
         mine = np.flatnonzero(crayon == k)
         some = lines.only(mine)
-        level = np.clip(0.5 + some.contrast / 0.3, 0.5, 1.2) * np.repeat(pressure[mine], np.diff(some.first))
-        paths = hand.Paths(some.points, level.astype(np.float32), np.zeros(len(level), np.int32), some.first)
+        level = np.clip(0.5 + some.contrast / 0.3, 0.5, 1.2) * np.repeat(
+            pressure[mine], np.diff(some.first)
+        )
+        paths = hand.Paths(
+            some.points, level.astype(np.float32), np.zeros(len(level), np.int32), some.first
+        )
         for _ in range(style.search):
             strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng, TAPER)
     return strokes
@@ -84,12 +95,15 @@ def _edges(scene: Scene, lightness: Floats, width: float) -> Lines:
     """Candidate lines along the scene's edges for a tip `width` cells wide."""
     h, w = lightness.shape
     grey = cv2.resize(
-        np.clip(lightness * 255, 0, 255).astype(np.uint8), (w * SCALE, h * SCALE), interpolation=cv2.INTER_CUBIC
+        np.clip(lightness * 255, 0, 255).astype(np.uint8),
+        (w * SCALE, h * SCALE),
+        interpolation=cv2.INTER_CUBIC,
     )
     detector = cv2.ximgproc.createEdgeDrawing()
     settings = cv2.ximgproc_EdgeDrawing_Params()  # type: ignore[attr-defined]
     settings.GradientThresholdValue = 14
-    settings.AnchorThresholdValue = 0  # a clean step's gradient is as high on two pixels, none of which would stand out
+    # a clean step's gradient is as high on two pixels, none of which would stand out
+    settings.AnchorThresholdValue = 0
     settings.MinPathLength = max(8, int(6 * width * SCALE))
     detector.setParams(settings)
     detector.detectEdges(grey)
@@ -111,13 +125,15 @@ def _areas(scene: Scene, group: NDArray[np.int32], lightness: Floats, width: flo
         for ring in rings:
             path = ring[:, 0].astype(np.float32) + 0.5
             if cv2.contourArea(path) >= 20 * width * width:
-                around = np.concatenate([path, path[: max(3, int(2 * width))]])  # the end runs past the beginning
+                # the end runs past the beginning
+                around = np.concatenate([path, path[: max(3, int(2 * width))]])
                 chains.append(np.repeat(around, SCALE, 0))
     fair = _faired(*_end_to_end(chains), 1.5 * width * SCALE)
     lines = _lines(fair, scene, lightness, width, AREA_WORTH)
     x, y = lines.points.T
     off = (x < 3) | (y < 3) | (x > group.shape[1] - 3) | (y > group.shape[0] - 3)
-    return lines.only(np.flatnonzero(_means(off.astype(np.float32), lines.first) <= 0.5))  # not the picture's border
+    # not the picture's border
+    return lines.only(np.flatnonzero(_means(off.astype(np.float32), lines.first) <= 0.5))
 
 
 def _together(one: Lines, other: Lines) -> Lines:
@@ -128,18 +144,29 @@ def _together(one: Lines, other: Lines) -> Lines:
     return Lines(points, first, contrast, worth)
 
 
-def _lines(fair: Lines, scene: Scene, lightness: Floats, width: float, factor: float = 1.0) -> Lines:
-    """Those faired chains that are long and strong enough to be lines, with their contrast and worth."""
+def _lines(
+    fair: Lines, scene: Scene, lightness: Floats, width: float, factor: float = 1.0
+) -> Lines:
+    """Those faired chains that are long and strong enough to be lines, with their contrast and
+    worth.
+    """
     fair = fair.only(np.flatnonzero(np.diff(fair.first) >= max(3.0, 5 * width)))
     aside = np.float32(0.6 * width) * _normals(fair)
-    contrast = np.abs(_sample(lightness, fair.points + aside) - _sample(lightness, fair.points - aside))
+    contrast = np.abs(
+        _sample(lightness, fair.points + aside) - _sample(lightness, fair.points - aside)
+    )
     mean = _means(contrast, fair.first)
     who = scene.subject.mask
     care = _means(_sample(scene.care, fair.points), fair.first)
-    rim = _means(np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)), fair.first)
+    rim = _means(
+        np.abs(_sample(who, fair.points + 3 * aside) - _sample(who, fair.points - 3 * aside)),
+        fair.first,
+    )
     mean = mean * np.clip((CURLED - _turning(fair) * width) / 0.3, 0, 1)
     worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
-    return Lines(fair.points, fair.first, contrast, worth).only(np.flatnonzero(mean * factor >= 0.08))
+    return Lines(fair.points, fair.first, contrast, worth).only(
+        np.flatnonzero(mean * factor >= 0.08)
+    )
 
 
 def _end_to_end(chains: Sequence[NDArray[Any]]) -> tuple[Floats, NDArray[np.int64]]:
@@ -151,14 +178,24 @@ def _end_to_end(chains: Sequence[NDArray[Any]]) -> tuple[Floats, NDArray[np.int6
 def _faired(points: Floats, first: NDArray[np.int64], sigma: float) -> Lines:
     """Chains smoothed along themselves, their ends kept, and thinned to one point a cell or so."""
     smooth, thin = np.empty_like(points), np.empty_like(first)
-    _fair(points, first, np.exp(-0.5 * (np.arange(int(3 * sigma) + 1) / sigma) ** 2), SCALE, smooth, thin)
+    _fair(
+        points,
+        first,
+        np.exp(-0.5 * (np.arange(int(3 * sigma) + 1) / sigma) ** 2),
+        SCALE,
+        smooth,
+        thin,
+    )
     smooth = smooth[: thin[-1]]
-    return Lines(smooth, thin, np.zeros(len(smooth), np.float32), np.zeros(len(thin) - 1, np.float32))
+    return Lines(
+        smooth, thin, np.zeros(len(smooth), np.float32), np.zeros(len(thin) - 1, np.float32)
+    )
 
 
 @kernel
 def _fair(points, first, weights, every, smooth, thin):  # type: ignore[no-untyped-def]
-    """Every `every`th point of each chain, smoothed by half a bell of `weights`: smooth (n, 2), thin (chains + 1,).
+    """Every `every`th point of each chain, smoothed by half a bell of `weights`: smooth (n, 2),
+    thin (chains + 1,).
 
     Beyond its ends a chain goes on as its mirror image about them.
     """
@@ -168,7 +205,9 @@ def _fair(points, first, weights, every, smooth, thin):  # type: ignore[no-untyp
         begin, end = first[line], first[line + 1] - 1
         for i in range(begin, end + 1, every):
             total, x, y = 0.0, 0.0, 0.0
-            for o in range(-min(weights.size - 1, end - begin), min(weights.size - 1, end - begin) + 1):
+            for o in range(
+                -min(weights.size - 1, end - begin), min(weights.size - 1, end - begin) + 1
+            ):
                 weight, j = weights[abs(o)], i + o
                 total += weight
                 if j < begin:
@@ -197,7 +236,9 @@ def _normals(lines: Lines) -> Floats:
 def _turning(lines: Lines) -> Floats:
     """How much each line turns, in radians a cell of its length."""
     normals = _normals(lines)
-    ahead = np.minimum(np.arange(len(normals)) + 1, np.repeat(lines.first[1:] - 1, np.diff(lines.first)))
+    ahead = np.minimum(
+        np.arange(len(normals)) + 1, np.repeat(lines.first[1:] - 1, np.diff(lines.first))
+    )
     turn = np.arccos(np.clip((normals * normals[ahead]).sum(1), -1, 1))
     return _means(turn.astype(np.float32), lines.first)
 
@@ -216,10 +257,16 @@ def _sample(image: Floats, points: Floats) -> Floats:
     return image[j, i]
 
 
-def _crayons(lines: Lines, scene: Scene, now: Floats, box: Swatches, style: Style) -> tuple[NDArray[np.int64], Floats]:
-    """For each line the crayon and pressure that come nearest to its darker side's hue, clearly darker than it."""
+def _crayons(
+    lines: Lines, scene: Scene, now: Floats, box: Swatches, style: Style
+) -> tuple[NDArray[np.int64], Floats]:
+    """For each line the crayon and pressure that come nearest to its darker side's hue, clearly
+    darker than it.
+    """
     aside = np.float32(0.8 * style.line_tip * style.tip_mm / scene.cell_mm) * _normals(lines)
-    sides = [_means(_sample(scene.lab, lines.points + side * aside), lines.first) for side in (1, -1)]
+    sides = [
+        _means(_sample(scene.lab, lines.points + side * aside), lines.first) for side in (1, -1)
+    ]
     darker = np.where(sides[0][:, :1] <= sides[1][:, :1], *sides)
     ground = _means(_sample(now, lines.points), lines.first)
     aim = darker.copy()
@@ -231,4 +278,6 @@ def _crayons(lines: Lines, scene: Scene, now: Floats, box: Swatches, style: Styl
     skin = _means(_sample(scene.skin, lines.points), lines.first)
     off += BODY_PRICE * skin[:, None, None] * foreign(box, SKIN_RAD)[None, :, None]
     k, p = np.divmod(off.reshape(len(off), math.prod(off.shape[1:])).argmin(1), off.shape[2])
-    return k, box.pressures[hardest][p] * np.float32(style.line_press * firmness(style.line_tip * style.tip_mm))
+    return k, box.pressures[hardest][p] * np.float32(
+        style.line_press * firmness(style.line_tip * style.tip_mm)
+    )

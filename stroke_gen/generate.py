@@ -8,7 +8,18 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analysis, contours, hand, hatching, margin, mixing, portrait, scene, separation, touches
+from . import (
+    analysis,
+    contours,
+    hand,
+    hatching,
+    margin,
+    mixing,
+    portrait,
+    scene,
+    separation,
+    touches,
+)
 from .analysis import blur
 from .drawing import Stroke, Tip
 from .mixing import LAYERS
@@ -27,13 +38,24 @@ Stage = Callable[[Floats], list[Stroke]]
 
 
 def generate(
-    photo: Floats, subject: Subject, width_mm: float, height_mm: float, swatches: Swatches, style: Style, seed: int, *,
-    draw: Draw, look: Look, threads: int, focus: Sequence[tuple[float, float, float, float]] = (),
-) -> list[Stroke]:  # fmt: skip
-    """Strokes for a photo in linear light (h, w, 3) of a subject (see `subject.see`), in drawing order.
+    photo: Floats,
+    subject: Subject,
+    width_mm: float,
+    height_mm: float,
+    swatches: Swatches,
+    style: Style,
+    seed: int,
+    *,
+    draw: Draw,
+    look: Look,
+    threads: int,
+    focus: Sequence[tuple[float, float, float, float]] = (),
+) -> list[Stroke]:
+    """Strokes for a photo in linear light (h, w, 3) of a subject (see `subject.see`), in drawing
+    order.
 
-    draw(strokes) draws further strokes on the open sheet; look(shape) returns what it shows now, as linear light
-    on a grid of `shape`: the generator steps back and looks before each coat.
+    draw(strokes) draws further strokes on the open sheet; look(shape) returns what it shows now, as
+    linear light on a grid of `shape`: the generator steps back and looks before each coat.
     """
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
@@ -52,7 +74,11 @@ def generate(
 
 def stages(style: Style) -> int:
     """How many times `generate` draws."""
-    return sum(LAYERS if coat.kind == "fill" else 1 for coat in style.passes) + 2 + 2 * style.lines_first
+    return (
+        sum(LAYERS if coat.kind == "fill" else 1 for coat in style.passes)
+        + 2
+        + 2 * style.lines_first
+    )
 
 
 def _stages(
@@ -73,28 +99,44 @@ def _stages(
         yield lines
     for coat in style.passes:
         if coat.kind == "touch":
-            yield partial(_touch, plan, inside=inside * (1 - features), coat=coat, style=style, rng=rng)
+            yield partial(
+                _touch, plan, inside=inside * (1 - features), coat=coat, style=style, rng=rng
+            )
             continue
         for turn in range(LAYERS) if coat.kind == "fill" else (None,):
-            yield partial(_fill, plan, inside=inside * (1 - white), coat=coat, turn=turn, style=style, rng=rng)
+            yield partial(
+                _fill, plan, inside=inside * (1 - white), coat=coat, turn=turn, style=style, rng=rng
+            )
     yield faces
     yield lines
 
 
-def _plan(seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generator, pool: Executor) -> Plan:
+def _plan(
+    seen: Scene, swatches: Swatches, style: Style, rng: np.random.Generator, pool: Executor
+) -> Plan:
     """Take crayons out of the box."""
     mixtures = mixing.find(seen, swatches, style.crayons, rng)
     return Plan(seen, swatches.only(mixtures.crayons()), mixtures.alone(), pool)
 
 
 def _fill(
-    plan: Plan, now: Floats, inside: Floats, coat: Pass, turn: int | None, style: Style, rng: np.random.Generator
+    plan: Plan,
+    now: Floats,
+    inside: Floats,
+    coat: Pass,
+    turn: int | None,
+    style: Style,
+    rng: np.random.Generator,
 ) -> list[Stroke]:
-    """One layer of the mixtures, or all once more, light to dark: wide in the ground, finer where care is due."""
+    """One layer of the mixtures, or all once more, light to dark: wide in the ground, finer where
+    care is due.
+    """
     seen = plan.scene
     wide = coat.tip * style.tip_mm / seen.cell_mm
     wants = separation.plates(plan, blur(now, 0.5 * wide), turn, coat.dark_price)
-    tangent = analysis.turned(seen.tangent, np.float32(CROSS[turn] * coat.cross if turn is not None else coat.angle))
+    tangent = analysis.turned(
+        seen.tangent, np.float32(CROSS[turn] * coat.cross if turn is not None else coat.angle)
+    )
     gaps = (1 + style.open * (1 - seen.care)).astype(np.float32)
     careful = seen.care > SUBJECT
     parts = []
@@ -119,20 +161,32 @@ def _touch(
 
 
 def _hatched(
-    plan: Plan, parts: list[tuple[int, float, Floats]], tangent: Floats, gaps: Floats, coat: Pass, style: Style,
+    plan: Plan,
+    parts: list[tuple[int, float, Floats]],
+    tangent: Floats,
+    gaps: Floats,
+    coat: Pass,
+    style: Style,
     rng: np.random.Generator,
-) -> list[Stroke]:  # fmt: skip
+) -> list[Stroke]:
     """Hatching of (crayon, tip in usual tips, pressure (h, w)), in that order."""
     seen, names = plan.scene, plan.swatches.names
     jobs = list(zip(parts, rng.spawn(len(parts)), strict=True))
 
     def drawn(job: tuple[tuple[int, float, Floats], np.random.Generator]) -> list[Stroke]:
         (k, factor, want), own = job
-        tip = Tip("sharp" if coat.sharp else "blunt", round(factor * style.tip_mm, 3))  # as the file rounds it
+        # as the file rounds it
+        tip = Tip("sharp" if coat.sharp else "blunt", round(factor * style.tip_mm, 3))
         cells = tip.width_mm / seen.cell_mm
         hold = replace(style, press=style.press * coat.press * firmness(tip.width_mm))
-        how = hatching.Hatch(coat.spacing * cells, coat.shortest * cells, coat.reach * cells, coat.legs,
-                             coat.gap * cells, coat.single)  # fmt: skip
+        how = hatching.Hatch(
+            coat.spacing * cells,
+            coat.shortest * cells,
+            coat.reach * cells,
+            coat.legs,
+            coat.gap * cells,
+            coat.single,
+        )
         paths = hatching.hatch(want, gaps, tangent, seen.coherence, how, own)
         return hand.draw(paths, seen.cell_mm, names[k], tip, coat.name, hold, own)
 

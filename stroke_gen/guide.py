@@ -1,7 +1,7 @@
 """The photo as a guide: values made smooth where the photo is smooth and crisp where it is crisp.
 
-A guided filter (He, Sun and Tang 2010, with a coarse grid as in He and Sun 2015): in each window the values become
-a linear function of the photo's colours.
+A guided filter (He, Sun and Tang 2010, with a coarse grid as in He and Sun 2015): in each window
+the values become a linear function of the photo's colours.
 """
 
 import cv2
@@ -29,7 +29,9 @@ class Guide:
         self.coarse = np.asarray(cv2.resize(lab, size, interpolation=cv2.INTER_AREA), np.float32)
         self._sigma = radius / COARSE
         self._mean = blur(self.coarse, self._sigma)
-        products = np.einsum("...i,...j->...ij", self.coarse, self.coarse).reshape(*self.coarse.shape[:2], 9)
+        products = np.einsum("...i,...j->...ij", self.coarse, self.coarse).reshape(
+            *self.coarse.shape[:2], 9
+        )
         spread = blur(products, self._sigma).reshape(*self.coarse.shape, 3)
         spread -= np.einsum("...i,...j->...ij", self._mean, self._mean)
         self._inverse = np.linalg.inv(spread + EPS * np.eye(3, dtype=np.float32)).astype(np.float32)
@@ -41,5 +43,7 @@ class Guide:
         slope = np.einsum("...ij,...j->...i", self._inverse, cross)
         level = mean - (slope * self._mean).sum(-1)
         lines = blur(np.dstack([slope, level]).astype(np.float32), self._sigma)
-        fine = np.asarray(cv2.resize(lines, self.lab.shape[1::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+        fine = np.asarray(
+            cv2.resize(lines, self.lab.shape[1::-1], interpolation=cv2.INTER_LINEAR), np.float32
+        )
         return np.asarray((fine[..., :3] * self.lab).sum(-1) + fine[..., 3], np.float32)

@@ -1,8 +1,9 @@
-"""Hatching: zigzags without lifting the crayon, along the orientation field, where a crayon is wanted.
+"""Hatching: zigzags without lifting the crayon, along the orientation field, where a crayon is
+wanted.
 
-A leg follows the field until the crayon is no longer wanted, another line is near, the turn is too sharp
-or the hand's reach ends; the next leg starts one spacing beside its end and runs back. Lines are kept
-apart by stamping finished legs on a map.
+A leg follows the field until the crayon is no longer wanted, another line is near, the turn is too
+sharp or the hand's reach ends; the next leg starts one spacing beside its end and runs back. Lines
+are kept apart by stamping finished legs on a map.
 """
 
 from dataclasses import dataclass
@@ -51,7 +52,10 @@ def _leg(x, y, dx, dy, want, tangent, stamp, fine, step, reach, gap, sharpest, o
         if n > 0 and tx * dx + ty * dy < sharpest:
             break
         # A hand does not turn at once: the direction follows the field with some inertia.
-        tx, ty = np.float32(0.35) * tx + np.float32(0.65) * dx, np.float32(0.35) * ty + np.float32(0.65) * dy
+        tx, ty = (
+            np.float32(0.35) * tx + np.float32(0.65) * dx,
+            np.float32(0.35) * ty + np.float32(0.65) * dy,
+        )
         norm = np.sqrt(tx * tx + ty * ty)
         dx, dy = tx / norm, ty / norm
         x, y = x + step * dx, y + step * dy
@@ -91,9 +95,13 @@ def _press(stamp, path, n, spacing, gaps, fine):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing, shortest, reach, legs, gap, single, step, fine, stamp,  # type: ignore[no-untyped-def]
-           points, first, leg_of):  # fmt: skip
-    """Zigzags from `seeds` (n, 2) in order. Writes points (m, 2), leg_of (m,), first (strokes + 1); returns strokes."""
+def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing,  # type: ignore[no-untyped-def]
+           shortest, reach, legs, gap, single, step, fine, stamp, points, first,
+           leg_of):  # fmt: skip
+    """Zigzags from `seeds` (n, 2) in order.
+
+    Writes points (m, 2), leg_of (m,), first (strokes + 1); returns strokes.
+    """
     h, w = want.shape
     forth, back = np.empty((2048, 2), np.float32), np.empty((2048, 2), np.float32)
     used, strokes, dice = 0, 0, 0
@@ -114,18 +122,56 @@ def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing, shortest, reach
         for leg in range(most):
             if leg == 0:  # through the seed both ways
                 n = _leg(
-                    x, y, tx, ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, forth
+                    x,
+                    y,
+                    tx,
+                    ty,
+                    want,
+                    tangent,
+                    stamp,
+                    fine,
+                    step,
+                    own_reach * np.float32(0.5),
+                    gap,
+                    sharpest,
+                    forth,
                 )
                 m = _leg(
-                    x, y, -tx, -ty, want, tangent, stamp, fine, step, own_reach * np.float32(0.5), gap, sharpest, back
+                    x,
+                    y,
+                    -tx,
+                    -ty,
+                    want,
+                    tangent,
+                    stamp,
+                    fine,
+                    step,
+                    own_reach * np.float32(0.5),
+                    gap,
+                    sharpest,
+                    back,
                 )
             else:  # one spacing beside the last end: a little further on, then back
                 n = _leg(
-                    x, y, tx, ty, want, tangent, stamp, fine, step, spacing * np.float32(1.5), gap, sharpest, forth
+                    x,
+                    y,
+                    tx,
+                    ty,
+                    want,
+                    tangent,
+                    stamp,
+                    fine,
+                    step,
+                    spacing * np.float32(1.5),
+                    gap,
+                    sharpest,
+                    forth,
                 )
                 ragged = own_reach * (np.float32(0.85) + np.float32(0.3) * luck[dice % luck.size])
                 dice += 1
-                m = _leg(x, y, -tx, -ty, want, tangent, stamp, fine, step, ragged, gap, sharpest, back)
+                m = _leg(
+                    x, y, -tx, -ty, want, tangent, stamp, fine, step, ragged, gap, sharpest, back
+                )
             if (n + m) * step < shortest or used + n + m + 1 >= points.shape[0]:
                 break
             begin = used
@@ -150,7 +196,12 @@ def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing, shortest, reach
             beside = spacing * gaps[int(ey), int(ex)]
             for p in range(used - 1, max(begin, used - 1 - int(np.float32(3) * beside / step)), -1):
                 nx, ny = points[p, 0] - side * ty * beside, points[p, 1] + side * tx * beside
-                if 0 <= nx < w and 0 <= ny < h and want[int(ny), int(nx)] > 0 and _free(stamp, nx, ny, fine, 1):
+                if (
+                    0 <= nx < w
+                    and 0 <= ny < h
+                    and want[int(ny), int(nx)] > 0
+                    and _free(stamp, nx, ny, fine, 1)
+                ):
                     x, y, found = nx, ny, True
                     break
             side = -side  # the direction has turned about, the side on the sheet has not
@@ -163,9 +214,16 @@ def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing, shortest, reach
 
 
 def hatch(
-    want: Floats, gaps: Floats, tangent: Floats, coherence: Floats, how: Hatch, rng: np.random.Generator
+    want: Floats,
+    gaps: Floats,
+    tangent: Floats,
+    coherence: Floats,
+    how: Hatch,
+    rng: np.random.Generator,
 ) -> Paths:
-    """Zigzags over want > 0, whose values are the pressure; gaps (h, w) widen the spacing; paths in work cells."""
+    """Zigzags over want > 0, whose values are the pressure; gaps (h, w) widen the spacing; paths in
+    work cells.
+    """
     h, w = want.shape
     seeds = _seeds(want, how, rng)
     stamp = np.zeros((h * FINE, w * FINE), np.uint8)
@@ -175,8 +233,24 @@ def hatch(
     first = np.zeros(len(seeds) + 2, np.int64)
     luck = rng.random(4099, np.float32)
     numbers = [np.float32(v) for v in (how.spacing, how.shortest, how.reach)]
-    strokes = _hatch(want, gaps, tangent, coherence, seeds, luck, *numbers, how.legs, np.float32(how.gap),
-                     np.float32(how.single), np.float32(STEP), FINE, stamp, points, first, leg_of)  # fmt: skip
+    strokes = _hatch(
+        want,
+        gaps,
+        tangent,
+        coherence,
+        seeds,
+        luck,
+        *numbers,
+        how.legs,
+        np.float32(how.gap),
+        np.float32(how.single),
+        np.float32(STEP),
+        FINE,
+        stamp,
+        points,
+        first,
+        leg_of,
+    )
     first = first[: strokes + 1]
     points = points[: first[-1]]
     pressure = want[points[:, 1].astype(np.int64), points[:, 0].astype(np.int64)]
@@ -194,7 +268,9 @@ def _carried_over(pressure: Floats) -> Floats:
 
 @lean_kernel
 def _sow(want, left, top, rows, cols, pitch, jitter, block, seeds, rank):  # type: ignore[no-untyped-def]
-    """Seeds (n, 2) on a jittered grid where they are wanted, and the rank (n,) of the region each lies in."""
+    """Seeds (n, 2) on a jittered grid where they are wanted, and the rank (n,) of the region each
+    lies in.
+    """
     h, w = want.shape
     most = jitter.shape[1] - 1
     number = 0

@@ -1,9 +1,11 @@
 """Mixing: which crayons, light under dark, make the colours of each surface.
 
-A person takes one to four crayons for a surface and lays each over the whole of it, with a pressure that
-follows the tone. For every surface the ordered mixture is sought that serves all of its colours at the least
-cost: distance seen from afar, grain, and the price of crayons that a careful hand leaves in the box (a hue
-that opposes the surface's, grey in a colour, black in the light). One box serves all surfaces.
+A person takes one to four crayons for a surface and lays each over the whole of it, with a pressure
+that follows the tone. For every surface the ordered mixture is sought that serves all of its
+colours at the least
+cost: distance seen from afar, grain, and the price of crayons that a careful hand leaves in the box
+(a hue that opposes the surface's, grey in a colour, black in the light). One box serves all
+surfaces.
 """
 
 from dataclasses import dataclass
@@ -27,7 +29,8 @@ LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
-DARK_PRICE = 0.2  # for a crayon darker than the surface's darkest, times the difference of lightness
+# for a crayon darker than the surface's darkest, times the difference of lightness
+DARK_PRICE = 0.2
 BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
 DARK_BODY = 0.46  # OKLab L below which skin and hair are dark
 WARM = np.deg2rad(58)  # OKLab hue of both
@@ -52,13 +55,24 @@ class Wax(NamedTuple):
 
 def wax(swatches: Swatches) -> Wax:
     """The swatches as kernels take them."""
-    return Wax(swatches.paper, np.float32(COVERED), swatches.a, swatches.b, swatches.grain, swatches.lightness(),
-               TO_LMS, TO_LAB, np.float32(GRAIN_PRICE))  # fmt: skip
+    return Wax(
+        swatches.paper,
+        np.float32(COVERED),
+        swatches.a,
+        swatches.b,
+        swatches.grain,
+        swatches.lightness(),
+        TO_LMS,
+        TO_LAB,
+        np.float32(GRAIN_PRICE),
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Mixtures:
-    """The crayons of each surface: (surfaces, LAYERS), by their place in the box, lightest first, then -1."""
+    """The crayons of each surface: (surfaces, LAYERS), by their place in the box, lightest first,
+    then -1.
+    """
 
     layers: Ints
 
@@ -87,11 +101,12 @@ def _lab(light, to_lms, to_lab, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def combine(ground, crayons, pressures, wax, colour, price):  # type: ignore[no-untyped-def]
-    """OKLab (choices, 3) and price of grain of every choice of pressures for crayons laid over a ground.
+    """OKLab (choices, 3) and price of grain of every choice of pressures for crayons laid over a
+    ground.
 
 
-    crayons: lightest first; pressures: which of the table's, 0 for none, 1 for its first. Choices count the first
-    crayon's pressure slowest.
+    crayons: lightest first; pressures: which of the table's, 0 for none, 1 for its first. Choices
+    count the first crayon's pressure slowest.
     """
     a, b, paper = wax.a, wax.b, wax.paper
     count, levels = crayons.size, pressures.size
@@ -109,15 +124,25 @@ def combine(ground, crayons, pressures, wax, colour, price):  # type: ignore[no-
             if p < 0:
                 continue
             k = crayons[n]
-            off = max(max(abs(light[0] - paper[0]), abs(light[1] - paper[1])), abs(light[2] - paper[2]))
+            off = max(
+                max(abs(light[0] - paper[0]), abs(light[1] - paper[1])), abs(light[2] - paper[2])
+            )
             waxed = min(off / wax.covered, np.float32(1))
             through = (a[0, k, p, 0] + a[0, k, p, 1] + a[0, k, p, 2]) / 3
-            below = np.float32(0.2126) * light[0] + np.float32(0.7152) * light[1] + np.float32(0.0722) * light[2]
-            # Flecks below are covered by as much as the crayon hides; its own show by how far it differs.
+            below = (
+                np.float32(0.2126) * light[0]
+                + np.float32(0.7152) * light[1]
+                + np.float32(0.0722) * light[2]
+            )
+            # Flecks below are covered by as much as the crayon hides; its own show by how far it
+            # differs.
             depth = abs(np.sqrt(below) - wax.dull[k]) / (1 - min(wax.dull[k], np.float32(0.8)))
             dots = dots * through + wax.grain[k, p] * min(depth, np.float32(1))
             for c in range(3):
-                bare, over = a[0, k, p, c] * light[c] + b[0, k, p, c], a[1, k, p, c] * light[c] + b[1, k, p, c]
+                bare, over = (
+                    a[0, k, p, c] * light[c] + b[0, k, p, c],
+                    a[1, k, p, c] * light[c] + b[1, k, p, c],
+                )
                 light[c] = bare + waxed * (over - bare)
         _lab(light, wax.to_lms, wax.to_lab, colour[m])
         price[m] = wax.grain_price * dots
@@ -141,7 +166,9 @@ def _cost(sample, colour, price, number):  # type: ignore[no-untyped-def]
 
 @kernel
 def _try(sample, mixtures, extra, allowed, pressures, wax, cost):  # type: ignore[no-untyped-def]
-    """cost (surfaces, mixtures) of mixtures (m, n), with the prices `extra` (surfaces, crayons) of their crayons."""
+    """cost (surfaces, mixtures) of mixtures (m, n), with the prices `extra` (surfaces, crayons) of
+    their crayons.
+    """
     length = mixtures.shape[2]
     total = pressures.size**length
     colour, price = np.empty((total, 3), np.float32), np.empty(total, np.float32)
@@ -185,10 +212,15 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     pairs = np.stack([order[first], order[second]], 1)
     double = np.broadcast_to(pairs[None], (len(sample), *pairs.shape)).copy()
     two = tried(double, every, full)
-    allowed = _box(np.hstack([one, two]), [[int(k)] for k in order] + pairs.tolist(), size, number, most)
+    allowed = _box(
+        np.hstack([one, two]), [[int(k)] for k in order] + pairs.tolist(), size, number, most
+    )
     best = np.full((len(sample), LAYERS), -1, np.int64)
     least = np.full(len(sample), np.inf, np.float32)
-    found = [(single, np.where(allowed[single[..., 0]], one, 9)), (double, np.where(allowed[double].all(2), two, 9))]
+    found = [
+        (single, np.where(allowed[single[..., 0]], one, 9)),
+        (double, np.where(allowed[double].all(2), two, 9)),
+    ]
     rank = np.argsort(order)
     for length in range(1, LAYERS + 1):
         if length > 2:
@@ -206,12 +238,16 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     return Mixtures(best)
 
 
-def _samples(lab: Floats, label: NDArray[np.int32], rng: np.random.Generator) -> tuple[Floats, NDArray[np.float64]]:
+def _samples(
+    lab: Floats, label: NDArray[np.int32], rng: np.random.Generator
+) -> tuple[Floats, NDArray[np.float64]]:
     """Colours (surfaces, 3, SAMPLES) of each surface, and its share of the sheet."""
     flat, colours = label.ravel(), lab.reshape(-1, 3)
     where = np.argsort(flat, kind="stable")
     first = np.searchsorted(flat[where], np.arange(int(flat.max()) + 2))
-    chosen = np.stack([where[a + (rng.random(SAMPLES) * (b - a)).astype(np.int64)] for a, b in pairwise(first)])
+    chosen = np.stack(
+        [where[a + (rng.random(SAMPLES) * (b - a)).astype(np.int64)] for a, b in pairwise(first)]
+    )
     return np.ascontiguousarray(colours[chosen].swapaxes(1, 2)), np.diff(first) / flat.size
 
 
@@ -231,7 +267,9 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
 
 
 def foreign(swatches: Swatches, width_rad: float) -> Floats:
-    """How foreign each crayon (crayons,) is to skin or hair: 0 within `width_rad` of their hue, 1 far from it."""
+    """How foreign each crayon (crayons,) is to skin or hair: 0 within `width_rad` of their hue, 1
+    far from it.
+    """
     hue = oklab(swatches.over(swatches.paper))[:, -3]
     chroma = np.linalg.norm(hue[:, 1:], axis=1)
     warm = (hue[:, 1] * np.cos(WARM) + hue[:, 2] * np.sin(WARM)) / (chroma + 1e-6)
@@ -242,14 +280,18 @@ def foreign(swatches: Swatches, width_rad: float) -> Floats:
 
 
 def blackness(swatches: Swatches) -> Floats:
-    """How nearly black each crayon (crayons,) is; the darkest skin and hair may take it, lighter ones must not."""
+    """How nearly black each crayon (crayons,) is; the darkest skin and hair may take it, lighter
+    ones must not.
+    """
     heavy = oklab(swatches.over(swatches.paper))[:, -1]
     colourless = np.clip(2 - np.hypot(heavy[:, 1], heavy[:, 2]) / 0.06, 0, 1)
     return (np.clip((0.45 - heavy[:, 0]) / 0.08, 0, 1) * colourless).astype(np.float32)
 
 
 def clash(one: Floats, other: Floats) -> Floats:
-    """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are within 44 degrees."""
+    """How far two hues (..., 2) in a and b oppose each other: 0 where one is neutral or both are
+    within 44 degrees.
+    """
     dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
     both = np.sqrt((one**2).sum(-1) * (other**2).sum(-1))
     return np.asarray(np.sqrt(np.maximum(0.72 * both - dot, 0)))
@@ -258,13 +300,17 @@ def clash(one: Floats, other: Floats) -> Floats:
 def greyness(colours: Floats) -> Floats:
     """How grey OKLab colours (n, 3) are: 1 for a grey, 0 for a hue and for black."""
     chroma = np.linalg.norm(colours[:, 1:], axis=1)
-    return (np.exp(-((chroma / 0.06) ** 2)) * np.clip((colours[:, 0] - 0.25) / 0.2, 0, 1)).astype(np.float32)
+    return (np.exp(-((chroma / 0.06) ** 2)) * np.clip((colours[:, 0] - 0.25) / 0.2, 0, 1)).astype(
+        np.float32
+    )
 
 
 def _box(
     cost: Floats, mixtures: list[list[int]], size: NDArray[np.float64], number: int, most: int
 ) -> NDArray[np.bool_]:
-    """Which crayons to take: starting from all, put back the one least missed until `most` remain in use."""
+    """Which crayons to take: starting from all, put back the one least missed until `most` remain
+    in use.
+    """
     holds = np.zeros((len(mixtures), number), np.bool_)
     for q, mixture in enumerate(mixtures):
         holds[q, mixture] = True
@@ -282,7 +328,9 @@ def _box(
 
 
 def _extended(mixtures: Ints, cost: Floats, crayons: Ints, rank: Ints) -> Ints:
-    """The best mixtures of each surface with one crayon more, each lightest first; -1 where that is none."""
+    """The best mixtures of each surface with one crayon more, each lightest first; -1 where that is
+    none.
+    """
     beam = np.argsort(cost, 1, kind="stable")[:, :BEAM]
     best = np.take_along_axis(mixtures, beam[..., None], 1)
     wider = np.concatenate([

@@ -1,7 +1,7 @@
 """Styles: every knob of the generator, with unit, range, effect and starting value.
 
-A style is a TOML file with these keys; the shipped ones lie in stroke_gen/styles. Lengths are in mm on the
-sheet or in widths of the tip ("tips").
+A style is a TOML file with these keys; the shipped ones lie in stroke_gen/styles. Lengths are in mm
+on the sheet or in widths of the tip ("tips").
 """
 
 import difflib
@@ -20,7 +20,8 @@ class Pass:
     """One coat of hatching over the whole sheet, after a look at what is there."""
 
     name: str = "coat"
-    kind: Annotated[str, "fill", "add", "touch"] = "fill"  # the mixtures in layers; once more; shapes
+    # the mixtures in layers; once more; shapes
+    kind: Annotated[str, "fill", "add", "touch"] = "fill"
     tip: Annotated[float, 0.2, 4] = 1.0  # width of the tip, in usual tips
     fine: Annotated[float, 0.2, 4] = 0.65  # the same where care is due
     sharp: bool = False  # a sharpened tip
@@ -28,17 +29,22 @@ class Pass:
     shortest: Annotated[float, 0.3, 20] = 2.5  # tips: shorter lines are left out
     reach: Annotated[float, 1, 60] = 20.0  # tips: the longest line without moving the arm
     legs: Annotated[int, 1, 60] = 12  # lines in one zigzag
-    cross: Annotated[float, 0, 90] = 18.0  # degrees by which the direction turns from layer to layer
+    # degrees by which the direction turns from layer to layer
+    cross: Annotated[float, 0, 90] = 18.0
     angle: Annotated[float, -90, 90] = 0.0  # degrees against the surface's direction
-    press: Annotated[float, 0.1, 5] = 1.0  # factor on its forces: wax takes hold of wax less than of paper
+    # factor on its forces: wax takes hold of wax less than of paper
+    press: Annotated[float, 0.1, 5] = 1.0
     dark_price: Annotated[float, 0, 4] = 0.3  # reluctance to go darker than the photo
     gap: Annotated[float, 0, 4] = 0.4  # tips of unwanted ground a line may cross
     single: Annotated[float, 0, 1] = 0.75  # coherence from which lines are drawn singly, as hair is
     cohere: Annotated[float, 0, 6] = 0.5  # touch: tips over which neighbours agree on a crayon
-    edge: Annotated[float, 0.1, 2] = 0.35  # touch: share of the tip that must gain; small keeps borders crisp
+    # touch: share of the tip that must gain; small keeps borders crisp
+    edge: Annotated[float, 0.1, 2] = 0.35
     hardest: Annotated[float, 0.03, 2] = 2.0  # touch: N/mm^2 at most
-    gain: Annotated[float, 0, 1] = 0.03  # touch: least gain in colour (OKLab) for which the hand moves
-    detail: Annotated[float, 0, 1] = 0.1  # touch: only where the photo has at least this much detail
+    # touch: least gain in colour (OKLab) for which the hand moves
+    gain: Annotated[float, 0, 1] = 0.03
+    # touch: only where the photo has at least this much detail
+    detail: Annotated[float, 0, 1] = 0.1
     tone: Annotated[float, 0, 4] = 1.0  # touch: weight of lightness against colour
     soften: Annotated[float, 0, 4] = 0.3  # touch: tips; the target is looked at this blurred
     least: Annotated[float, 0, 100] = 4.0  # touch: square tips; smaller shapes are left out
@@ -51,14 +57,19 @@ class Style:
     title: str = ""
     tip_mm: Annotated[float, 0.5, 30] = 2.4  # width of the usual tip
     crayons: Annotated[int, 1, 64] = 10  # most crayons taken out of the box
-    merge: Annotated[float, 0.01, 1] = 0.06  # OKLab units by which two large surfaces must differ to be two
-    open: Annotated[float, 0, 4] = 0.5  # how much wider the hatching of the ground is than the subject's
-    fade: Annotated[float, 0, 1] = 0.0  # share of the sheet that is left out, the farthest from the subject
+    # OKLab units by which two large surfaces must differ to be two
+    merge: Annotated[float, 0.01, 1] = 0.06
+    # how much wider the hatching of the ground is than the subject's
+    open: Annotated[float, 0, 4] = 0.5
+    # share of the sheet that is left out, the farthest from the subject
+    fade: Annotated[float, 0, 1] = 0.0
     margin_mm: Annotated[float, 0, 50] = 2.0  # paper left along the sheet's border
     chroma: Annotated[float, 0, 3] = 1.0  # colourfulness asked for
-    lift: Annotated[float, 0, 0.25] = 0.0  # middle tones drawn lighter than they are, as paper is lighter than a photo
+    # middle tones drawn lighter than they are, as paper is lighter than a photo
+    lift: Annotated[float, 0, 0.25] = 0.0
     skin: Annotated[float, 0, 3] = 0.45  # more colour for pale warm tones, so that skin stays skin
-    wrist_deg: Annotated[float, -90, 90] = -50.0  # the hand's own direction; -50 runs from lower left to upper right
+    # the hand's own direction; -50 runs from lower left to upper right
+    wrist_deg: Annotated[float, -90, 90] = -50.0
     wrist: Annotated[float, 0, 100] = 0.3  # how much the wrist counts against the form
     press: Annotated[float, 0.1, 5] = 1.0  # factor on all forces
     force_spread: Annotated[float, 0, 1] = 0.18  # from line to line
@@ -68,8 +79,10 @@ class Style:
     lines: Annotated[float, 0, 5] = 1.0  # amount of outline
     search: Annotated[int, 1, 4] = 1  # how many times a line is drawn until it sits
     closed: bool = False  # outlines go round whole areas instead of along edges
-    lines_first: bool = False  # outlines before the fill, as children draw; drawn once more at the end
-    symbols: Annotated[int, 0, 10] = 0  # age of the child who sets faces down as symbols; 0: as they look
+    # outlines before the fill, as children draw; drawn once more at the end
+    lines_first: bool = False
+    # age of the child who sets faces down as symbols; 0: as they look
+    symbols: Annotated[int, 0, 10] = 0
     line_tip: Annotated[float, 0.2, 3] = 0.45  # width of the outline's tip, in usual tips
     line_press: Annotated[float, 0.1, 5] = 1.0  # factor on the force of outlines
     passes: tuple[Pass, ...] = (Pass(),)
@@ -78,15 +91,25 @@ class Style:
 @functools.cache
 def style_names() -> dict[str, str]:
     """The shipped styles by name, with their titles."""
-    return {p.stem: str(tomllib.loads(p.read_text("utf-8"))["title"]) for p in sorted(_FOLDER.glob("*.toml"))}
+    return {
+        p.stem: str(tomllib.loads(p.read_text("utf-8"))["title"])
+        for p in sorted(_FOLDER.glob("*.toml"))
+    }
 
 
 def load_style(source: str) -> Style:
-    """A shipped style by name, or a user's TOML file. ValueError names the key and the nearest valid one."""
+    """A shipped style by name, or a user's TOML file.
+
+    ValueError names the key and the nearest valid one.
+    """
     path = _FOLDER / f"{source}.toml" if source in style_names() else Path(source)
     if path.suffix != ".toml" or not os.path.isfile(path):
         near = difflib.get_close_matches(source, style_names(), 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"valid: {', '.join(style_names())}, or a .toml file"
+        hint = (
+            f"did you mean {near[0]!r}?"
+            if near
+            else f"valid: {', '.join(style_names())}, or a .toml file"
+        )
         raise ValueError(f"style: {source!r} is unknown; {hint}")
     try:
         table = tomllib.loads(path.read_text("utf-8"))
@@ -102,7 +125,9 @@ def style_from(table: dict[str, Any], where: str) -> Style:
     if not isinstance(passes, list) or not all(isinstance(row, dict) for row in passes):
         raise ValueError(f"{where}: pass: write each coat as a [[pass]] table")
     values = _checked(table, Style, where)
-    coats = tuple(Pass(**_checked(row, Pass, f"{where}: pass {i + 1}")) for i, row in enumerate(passes))
+    coats = tuple(
+        Pass(**_checked(row, Pass, f"{where}: pass {i + 1}")) for i, row in enumerate(passes)
+    )
     return Style(**values, passes=coats)
 
 
@@ -110,22 +135,33 @@ def _checked(table: dict[str, Any], kind: type, where: str) -> dict[str, Any]:
     """The table if every key is known, of the right type and in range."""
     known = {f.name: f for f in fields(kind) if f.name != "passes"}
     hints = get_type_hints(kind, include_extras=True)
-    ranges = {name: hint.__metadata__ for name, hint in hints.items() if hasattr(hint, "__metadata__")}
+    ranges = {
+        name: hint.__metadata__ for name, hint in hints.items() if hasattr(hint, "__metadata__")
+    }
     for key, value in table.items():
         if key not in known:
             near = difflib.get_close_matches(key, [*known, "pass"], 1, 0.4)
-            raise ValueError(f"{where}: unknown key {key!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+            raise ValueError(
+                f"{where}: unknown key {key!r}" + (f"; did you mean {near[0]!r}?" if near else "")
+            )
         default = known[key].default
-        right = isinstance(value, type(default)) or (isinstance(default, float) and type(value) is int)
+        right = isinstance(value, type(default)) or (
+            isinstance(default, float) and type(value) is int
+        )
         if not right or (isinstance(value, bool) and not isinstance(default, bool)):
             raise ValueError(f"{where}: {key} = {value!r} is not a {type(default).__name__}")
         if isinstance(value, str):
             if not value or not value.isprintable():
                 raise ValueError(f"{where}: {key} = {value!r} is not a line of text")
             if key in ranges and value not in ranges[key]:
-                raise ValueError(f"{where}: {key} = {value!r} is not one of {', '.join(ranges[key])}")
+                raise ValueError(
+                    f"{where}: {key} = {value!r} is not one of {', '.join(ranges[key])}"
+                )
         elif key in ranges and not ranges[key][0] <= value <= ranges[key][1]:
-            raise ValueError(f"{where}: {key} = {value!r} is not between {ranges[key][0]:g} and {ranges[key][1]:g}")
+            raise ValueError(
+                f"{where}: {key} = {value!r} is not between {ranges[key][0]:g} and "
+                f"{ranges[key][1]:g}"
+            )
     return table
 
 
@@ -141,13 +177,15 @@ def with_force(style: Style, force: str | float) -> Style:
         except ValueError:
             factor = 0.0
     if not 0.1 <= factor <= 5:
-        raise ValueError(f"force: {force!r} is neither {', '.join(FORCES)} nor a number from 0.1 to 5")
+        raise ValueError(
+            f"force: {force!r} is neither {', '.join(FORCES)} nor a number from 0.1 to 5"
+        )
     return replace(style, press=style.press * factor)
 
 
 def with_age(style: Style, age: int) -> Style:
-    """The style as drawn at an age from 3 to 10: the younger, the fatter the crayon, the fewer colours, the
-    wider the gaps and the further beyond the border."""
+    """The style as drawn at an age from 3 to 10: the younger, the fatter the crayon, the fewer
+    colours, the wider the gaps and the further beyond the border."""
     if not style.lines_first:
         raise ValueError("age: only a style that draws outlines first, as child does, has an age")
     if not 3 <= age <= 10:

@@ -42,10 +42,17 @@ class Scene:
 
 
 def read(
-    photo: Floats, subject: Subject, width_mm: float, height_mm: float, swatches: Swatches, style: Style,
-    focus: Sequence[Box], pool: Executor,
-) -> Scene:  # fmt: skip
-    """See a photo in linear light (h, w, 3) for a sheet of the given size, as far as these crayons can draw it.
+    photo: Floats,
+    subject: Subject,
+    width_mm: float,
+    height_mm: float,
+    swatches: Swatches,
+    style: Style,
+    focus: Sequence[Box],
+    pool: Executor,
+) -> Scene:
+    """See a photo in linear light (h, w, 3) for a sheet of the given size, as far as these crayons
+    can draw it.
 
     focus: boxes (x, y, w, h) in fractions of the picture that deserve care.
     """
@@ -70,5 +77,18 @@ def read(
     guide = Guide((calm * (1 - fine) + lab * fine).astype(np.float32), WINDOW * tip)
     worth = (detail.result() * (0.35 + 0.65 * care)).astype(np.float32)
     return Scene(
-        target, lab, natural, guide, label, family, tangent, coherence, subject, skin, hair, care, worth, cell_mm
+        target,
+        lab,
+        natural,
+        guide,
+        label,
+        family,
+        tangent,
+        coherence,
+        subject,
+        skin,
+        hair,
+        care,
+        worth,
+        cell_mm,
     )

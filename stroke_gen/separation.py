@@ -1,8 +1,8 @@
 """Separation: how hard each crayon is pressed where, one smooth plate for each.
 
-What a surface's crayons give at all their pressures is compared with the photo; choices of nearly equal worth
-are averaged, so that pressure follows tone without steps. The plates are worked out on a coarse grid and spread
-along the photo's colours (see guide.py), whatever surfaces they cross.
+What a surface's crayons give at all their pressures is compared with the photo; choices of nearly
+equal worth are averaged, so that pressure follows tone without steps. The plates are worked out on
+a coarse grid and spread along the photo's colours (see guide.py), whatever surfaces they cross.
 """
 
 from concurrent.futures import Executor
@@ -19,7 +19,8 @@ from .swatches import Swatches
 
 Floats = NDArray[np.float32]
 SHARP = np.float32(1 / 0.012)  # how quickly a dearer choice loses its say, per OKLab unit
-WORTH = np.float32(0.008)  # OKLab units: a crayon that makes less difference is pressed less, or not taken
+# OKLab units: a crayon that makes less difference is pressed less, or not taken
+WORTH = np.float32(0.008)
 FAINT = 0.45  # of the lightest pressure of the table: below it the hand stays away
 
 
@@ -35,14 +36,19 @@ class Plan:
 
 @kernel
 def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp, level):  # type: ignore[no-untyped-def]
-    """Level (layers, n) of each crayon for the cells (n,): 0 none, 1 the lightest pressure of the table, and so on.
+    """Level (layers, n) of each crayon for the cells (n,): 0 none, 1 the lightest pressure of the
+    table, and so on.
 
     same: whether all cells have the ground of the first.
     """
     count, levels = crayons.size, pressures.size
     total = levels**count
     colour, price = np.empty((total, 3), np.float32), np.empty(total, np.float32)
-    cost, mean, without = np.empty(total, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
+    cost, mean, without = (
+        np.empty(total, np.float32),
+        np.empty(count, np.float32),
+        np.empty(count, np.float32),
+    )
     for i in range(cells.size):
         at = cells[i]
         if i == 0 or not same:
@@ -51,8 +57,16 @@ def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp
         least = np.float32(np.inf)
         without[:] = np.inf
         for m in range(total):
-            dl, da, db = colour[m, 0] - aim[at, 0], colour[m, 1] - aim[at, 1], colour[m, 2] - aim[at, 2]
-            cost[m] = np.sqrt(dl * dl + da * da + db * db) + price[m] + dark_price * max(np.float32(0), -dl)
+            dl, da, db = (
+                colour[m, 0] - aim[at, 0],
+                colour[m, 1] - aim[at, 1],
+                colour[m, 2] - aim[at, 2],
+            )
+            cost[m] = (
+                np.sqrt(dl * dl + da * da + db * db)
+                + price[m]
+                + dark_price * max(np.float32(0), -dl)
+            )
             least = min(least, cost[m])
             rest, step = m, total // levels
             for n in range(count):
@@ -81,13 +95,16 @@ def _soften(cells, aim, ground, same, crayons, pressures, wax, dark_price, sharp
 def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict[int, Floats]:
     """Pressure (h, w) wanted of each crayon that is wanted at all.
 
-    now: what the sheet shows, linear (h, w, 3). turn: the layer that comes next, 0 to LAYERS - 1, with all that
-    come after it in mind; None when all have been laid, and each may be pressed once more.
+    now: what the sheet shows, linear (h, w, 3). turn: the layer that comes next, 0 to LAYERS - 1,
+    with all that come after it in mind; None when all have been laid, and each may be pressed once
+    more.
     """
     scene, swatches = plan.scene, plan.swatches
     guide = scene.guide
     shape = guide.coarse.shape[:2]
-    ground = np.asarray(cv2.resize(now, shape[::-1], interpolation=cv2.INTER_AREA), np.float32).reshape(-1, 3)
+    ground = np.asarray(
+        cv2.resize(now, shape[::-1], interpolation=cv2.INTER_AREA), np.float32
+    ).reshape(-1, 3)
     aim = guide.coarse.reshape(-1, 3)
     label = cv2.resize(scene.family, shape[::-1], interpolation=cv2.INTER_NEAREST_EXACT).ravel()
     full = np.arange(len(swatches.pressures) + 1)
@@ -105,7 +122,18 @@ def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict
         cells = where[first[g] : first[g + 1]]
         level = np.empty((left.size, cells.size), np.float32)
         many = left.size >= (LAYERS if turn is not None else LAYERS - 1)
-        _soften(cells, aim, ground, turn == 0, left, FEW if many else full, table, np.float32(dark_price), SHARP, level)
+        _soften(
+            cells,
+            aim,
+            ground,
+            turn == 0,
+            left,
+            FEW if many else full,
+            table,
+            np.float32(dark_price),
+            SHARP,
+            level,
+        )
         for k, own in zip(left[: None if turn is None else 1], level, strict=False):
             levels[k, cells] = own
 

@@ -1,8 +1,9 @@
 """Surfaces: the photo parted into the few dozen things a person would fill one after the other.
 
 Felzenszwalb's segmentation (IJCV 2004) gives small calm pieces; neighbours are merged, the least
-different first, until the differences that are left would matter. Where care is due, merging is dear.
-Each surface has one direction of hatching, from which strokes turn only with a clear, large form.
+different first, until the differences that are left would matter. Where care is due, merging is
+dear. Each surface has one direction of hatching, from which strokes turn only with a clear, large
+form.
 """
 
 import cv2
@@ -16,7 +17,8 @@ from .jit import kernel
 Floats = NDArray[np.float32]
 Labels = NDArray[np.int32]
 WEIGHTS = np.array([0.7, 1, 1], np.float32)  # shading parts a surface less than a change of hue
-FAMILIAR = np.array([0.35, 1, 1], np.float32)  # light and dark of one hue are made of the same crayons
+# light and dark of one hue are made of the same crayons
+FAMILIAR = np.array([0.35, 1, 1], np.float32)
 CARE = 0.8  # how much dearer merging is in the most important places
 EDGE = 0.7  # weight of the step along the common border beside that between the means
 SUBJECT = 0.15  # OKLab units: what parts the one who is drawn from the ground
@@ -42,32 +44,63 @@ def part(lab: Floats, care: Floats, subject: Floats, tip: float, least: float) -
         for m in (lab, care, subject)
     )
     scale = 0.5 * tip
-    pieces = felzenszwalb(small * WEIGHTS, scale=0.6 * scale**2, sigma=0, min_size=max(4, int(scale**2)))
+    pieces = felzenszwalb(
+        small * WEIGHTS, scale=0.6 * scale**2, sigma=0, min_size=max(4, int(scale**2))
+    )
     label = _merged(pieces.astype(np.int32), small, dear, who, scale, least)
-    return _smooth(np.asarray(cv2.resize(label, (w, h), interpolation=cv2.INTER_NEAREST)), 0.35 * tip)
+    return _smooth(
+        np.asarray(cv2.resize(label, (w, h), interpolation=cv2.INTER_NEAREST)), 0.35 * tip
+    )
 
 
-def _merged(label: Labels, lab: Floats, care: Floats, who: Floats, tip: float, least: float) -> Labels:
-    """Neighbouring pieces merged, the cheapest pair first, until merging costs more than `least`."""
+def _merged(
+    label: Labels, lab: Floats, care: Floats, who: Floats, tip: float, least: float
+) -> Labels:
+    """Neighbouring pieces merged, the cheapest pair first, until merging costs more than
+    `least`.
+    """
     means, size = _means(label, np.dstack([lab * WEIGHTS, SUBJECT * who, care]))
-    length, step = np.zeros((size.size, size.size), np.float32), np.zeros((size.size, size.size), np.float32)
+    length, step = (
+        np.zeros((size.size, size.size), np.float32),
+        np.zeros((size.size, size.size), np.float32),
+    )
     _borders(label, lab * WEIGHTS, length, step)
     root = np.arange(size.size)
-    _merge(means, size, length, step, np.float32(LARGE * tip * tip), np.float32(EDGE), np.float32(CARE),
-           np.float32(least), root)  # fmt: skip
+    _merge(
+        means,
+        size,
+        length,
+        step,
+        np.float32(LARGE * tip * tip),
+        np.float32(EDGE),
+        np.float32(CARE),
+        np.float32(least),
+        root,
+    )
     return np.unique(root, return_inverse=True)[1][label].astype(np.int32)
 
 
 def families(label: Labels, lab: Floats, kind: Floats, least: float) -> NDArray[np.int64]:
-    """The family (surfaces,), from 0, of each surface: those alike are coloured alike, wherever they lie.
+    """The family (surfaces,), from 0, of each surface: those alike are coloured alike, wherever
+    they lie.
 
-    kind: (h, w) differs where colours must not be mixed, as skin and cloth; least: OKLab units between families.
+    kind: (h, w) differs where colours must not be mixed, as skin and cloth; least: OKLab units
+        between families.
     """
     means, size = _means(label, np.dstack([lab * FAMILIAR, KIND * kind, np.zeros_like(kind)]))
     everywhere = np.ones((size.size, size.size), np.float32) - np.eye(size.size, dtype=np.float32)
     root = np.arange(size.size)
-    _merge(means, size, everywhere, np.zeros_like(everywhere), np.float32(FAMILY * label.size), np.float32(0),
-           np.float32(0), np.float32(least), root)  # fmt: skip
+    _merge(
+        means,
+        size,
+        everywhere,
+        np.zeros_like(everywhere),
+        np.float32(FAMILY * label.size),
+        np.float32(0),
+        np.float32(0),
+        np.float32(least),
+        root,
+    )
     return np.unique(root, return_inverse=True)[1]
 
 
@@ -81,7 +114,9 @@ def _means(label: Labels, features: Floats) -> tuple[Floats, Floats]:
 
 @kernel
 def _borders(label, lab, length, step):  # type: ignore[no-untyped-def]
-    """Length of the border between each two pieces (n, n), and the steps of colour across it, added up."""
+    """Length of the border between each two pieces (n, n), and the steps of colour across it, added
+    up.
+    """
     h, w = label.shape
     for y in range(h):
         for x in range(w):
@@ -100,7 +135,9 @@ def _borders(label, lab, length, step):  # type: ignore[no-untyped-def]
 
 @kernel
 def _price(i, j, means, size, length, step, large, edge, care):  # type: ignore[no-untyped-def]
-    """What merging two neighbours costs: how they differ, less where one is small, more where care is due."""
+    """What merging two neighbours costs: how they differ, less where one is small, more where care
+    is due.
+    """
     square = np.float32(0)
     for c in range(4):
         square += (means[i, c] - means[j, c]) ** 2
@@ -111,7 +148,9 @@ def _price(i, j, means, size, length, step, large, edge, care):  # type: ignore[
 
 @kernel
 def _merge(means, size, length, step, large, edge, care, least, root):  # type: ignore[no-untyped-def]
-    """Merge the cheapest pair until none costs less than `least`; root (n,) is the piece each has become part of."""
+    """Merge the cheapest pair until none costs less than `least`; root (n,) is the piece each has
+    become part of.
+    """
     n = size.size
     best, price = np.full(n, -1), np.full(n, np.float32(np.inf))  # each piece's cheapest neighbour
     stale = np.ones(n, np.bool_)
@@ -165,21 +204,26 @@ def _smooth(label: Labels, sigma: float) -> Labels:
     return np.unique(out, return_inverse=True)[1].reshape(out.shape).astype(np.int32)
 
 
-def directions(tensor: Floats, label: Labels, care: Floats, tip: float, wrist_deg: float, wrist: float) -> Floats:
+def directions(
+    tensor: Floats, label: Labels, care: Floats, tip: float, wrist_deg: float, wrist: float
+) -> Floats:
     """Unit vectors (h, w, 2) along which strokes run, x then y.
 
-    tensor: (h, w, 3) cosine and sine of the double angle along the form, times its energy, and that energy.
-    A surface has one direction, from the structure in it, its own shape and the wrist; strokes turn from it only
-    where a large form is clear, and more readily where care is due.
+    tensor: (h, w, 3) cosine and sine of the double angle along the form, times its energy, and that
+    energy. A surface has one direction, from the structure in it, its own shape and the wrist;
+    strokes turn from it only where a large form is clear, and more readily where care is due.
     """
     h, w = label.shape
     size, tip = (-(-w // COARSE), -(-h // COARSE)), tip / COARSE
     tensor, care = (
-        np.asarray(cv2.resize(m, size, interpolation=cv2.INTER_AREA), np.float32) for m in (tensor, care)
+        np.asarray(cv2.resize(m, size, interpolation=cv2.INTER_AREA), np.float32)
+        for m in (tensor, care)
     )
     parts = np.asarray(cv2.resize(label, size, interpolation=cv2.INTER_NEAREST_EXACT))
     field = np.zeros((*parts.shape, 2), np.float32)
-    hand = wrist * np.array([np.cos(2 * np.deg2rad(wrist_deg)), np.sin(2 * np.deg2rad(wrist_deg))], np.float32)
+    hand = wrist * np.array(
+        [np.cos(2 * np.deg2rad(wrist_deg)), np.sin(2 * np.deg2rad(wrist_deg))], np.float32
+    )
     typical = np.float32(np.median(tensor[..., 2]) + 1e-9)
     pad = int(2.5 * FOLLOW * tip)
     for k in np.flatnonzero(np.bincount(parts.ravel())):
@@ -194,13 +238,19 @@ def directions(tensor: Floats, label: Labels, care: Floats, tip: float, wrist_de
         trust = np.clip((clear - 0.45 + 0.15 * care[box]) / 0.35, 0, 1)[..., None]
         turned = trust * spread[..., :2] / (firm[..., None] + 1e-12) + (1 - trust) * one
         field[box] += here[..., None] * turned
-    field = np.asarray(cv2.resize(blur(field, 0.8 * tip), (w, h), interpolation=cv2.INTER_LINEAR), np.float32)
+    field = np.asarray(
+        cv2.resize(blur(field, 0.8 * tip), (w, h), interpolation=cv2.INTER_LINEAR), np.float32
+    )
     angle = 0.5 * np.arctan2(field[..., 1], field[..., 0])
     return np.dstack([np.cos(angle), np.sin(angle)]).astype(np.float32)
 
 
-def _direction(tensor: Floats, here: Floats, hand: Floats, typical: np.float32, sheet: int) -> Floats:
-    """The one direction (2,), as a unit vector of the double angle, of the surface that `here` (h, w) marks."""
+def _direction(
+    tensor: Floats, here: Floats, hand: Floats, typical: np.float32, sheet: int
+) -> Floats:
+    """The one direction (2,), as a unit vector of the double angle, of the surface that `here` (h,
+    w) marks.
+    """
     # Its border says less than what it holds.
     inner = np.asarray(cv2.erode(here, np.ones((3, 3), np.uint8)), np.float32)
     inner = inner if inner.sum() > 0.3 * here.sum() else here

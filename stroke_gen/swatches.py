@@ -1,9 +1,9 @@
 """What the crayons give: the generator's whole knowledge of wax, as numbers.
 
-Hatching crayon k at pressure p over ground C shows, seen from afar, about `a * C + b` per channel of
-linear light (wax is translucent and covers part of the ground, and both act linearly on the light from
-below). Wax takes less on wax than on paper, so there is one line for bare paper and one for waxed ground. The
-table is measured on the real simulator with real hatching.
+Hatching crayon k at pressure p over ground C shows, seen from afar, about `a * C + b` per channel
+of linear light (wax is translucent and covers part of the ground, and both act linearly on the
+light from below). Wax takes less on wax than on paper, so there is one line for bare paper and one
+for waxed ground. The table is measured on the real simulator with real hatching.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,8 @@ from .colour import oklab
 Floats = NDArray[np.float32]
 TIP_MM = 2.4  # width of the blunt tip that hatched the swatches
 COVERED = 0.3  # linear light by which a ground covered with wax differs from the paper at least
-FINER = 0.75  # a tip n times finer needs n**FINER times the pressure for the same colour: it passes sooner
+# a tip n times finer needs n**FINER times the pressure for the same colour: it passes sooner
+FINER = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +45,20 @@ class Swatches:
     def only(self, chosen: list[int]) -> "Swatches":
         """The table of some of the crayons."""
         names = tuple(self.names[i] for i in chosen)
-        return Swatches(names, self.pressures, self.a[:, chosen], self.b[:, chosen], self.grain[chosen], self.paper)
+        return Swatches(
+            names,
+            self.pressures,
+            self.a[:, chosen],
+            self.b[:, chosen],
+            self.grain[chosen],
+            self.paper,
+        )
 
 
 def covered(ground: Floats, paper: Floats) -> Floats:
-    """How far a ground (..., 3) is covered with wax, 0..1, guessed from how far its light is from the paper's."""
+    """How far a ground (..., 3) is covered with wax, 0..1, guessed from how far its light is from
+    the paper's.
+    """
     return np.clip(np.abs(ground - paper).max(-1) / COVERED, 0, 1).astype(np.float32)
 
 

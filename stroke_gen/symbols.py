@@ -43,15 +43,7 @@ class _Child:
         press = np.clip(0.8 + 0.1 * self.rng.standard_normal(), 0.6, 1) * taper(
             len(line), 0.05, 0.1
         )
-        self.made.append(
-            Mark(
-                f32(line),
-                f32(press),
-                f32(colour),
-                width * self.width,
-                "symbol",
-            )
-        )
+        self.made.append(Mark(f32(line), f32(press), f32(colour), width * self.width, "symbol"))
 
     def arc(self, middle: Floats, wide: float, high: float, begin: float, end: float) -> Floats:
         """Part of an ellipse that lies as the face does; in turns, clockwise from the right."""

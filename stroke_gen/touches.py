@@ -1,8 +1,9 @@
 """Touches: when all surfaces are laid, the few small places that still want a crayon of their own.
 
-The hand steps back, and takes a sharpened crayon to what has a shape and matters: eyes, lettering, a button, a
-highlight. The gain of a crayon is how much nearer the colour comes to the photo, less a price for grain
-(feather-light black on a light wall is pepper) and for going darker than the photo, which no crayon undoes.
+The hand steps back, and takes a sharpened crayon to what has a shape and matters: eyes, lettering,
+a button, a highlight. The gain of a crayon is how much nearer the colour comes to the photo, less a
+price for grain (feather-light black on a light wall is pepper) and for going darker than the photo,
+which no crayon undoes.
 """
 
 import cv2
@@ -54,8 +55,10 @@ def _off(light, lab, a, b, to_lms, to_lab, tone, dark_price, price, off):  # typ
 
 
 @kernel
-def _gain(top, left, current, lab, need, a, b, grain, to_lms, to_lab, tone, dark_price, grain_price, gain, best):  # type: ignore[no-untyped-def]
-    """Gain and pressure index (h, w) of a crayon in a window whose corner is (top, left), where `need` (h, w) is set.
+def _gain(top, left, current, lab, need, a, b, grain, to_lms,  # type: ignore[no-untyped-def]
+          to_lab, tone, dark_price, grain_price, gain, best):  # fmt: skip
+    """Gain and pressure index (h, w) of a crayon in a window whose corner is (top, left), where
+    `need` (h, w) is set.
 
     a, b and grain have a row for each pressure.
     """
@@ -68,14 +71,19 @@ def _gain(top, left, current, lab, need, a, b, grain, to_lms, to_lab, tone, dark
         for x in range(need.shape[1]):
             if need[y, x]:
                 for c in range(3):
-                    light[c, i], target[c, i] = current[top + y, left + x, c], lab[top + y, left + x, c]
+                    light[c, i], target[c, i] = (
+                        current[top + y, left + x, c],
+                        lab[top + y, left + x, c],
+                    )
                 i += 1
     now, off = np.empty(number, np.float32), np.empty(number, np.float32)
     most, which = np.full(number, np.float32(-9)), np.zeros(number, np.int8)
     same, nothing, zero = np.ones(3, np.float32), np.zeros(3, np.float32), np.float32(0)
     _off(light, target, same, nothing, to_lms, to_lab, tone, zero, zero, now)
     for p in range(grain.size):
-        _off(light, target, a[p], b[p], to_lms, to_lab, tone, dark_price, grain_price * grain[p], off)
+        _off(
+            light, target, a[p], b[p], to_lms, to_lab, tone, dark_price, grain_price * grain[p], off
+        )
         for i in range(number):
             better = now[i] - off[i] > most[i]
             most[i] = now[i] - off[i] if better else most[i]
@@ -92,10 +100,12 @@ def gains(
     current: Floats, lab: Floats, corner: tuple[int, int], need: NDArray[np.uint8],
     swatches: Swatches, k: int, coat: Pass,
 ) -> tuple[Floats, NDArray[np.int8]]:  # fmt: skip
-    """Gain of crayon k at its best pressure, and that pressure's index, in a window where it is needed.
+    """Gain of crayon k at its best pressure, and that pressure's index, in a window where it is
+    needed.
 
-    current: linear colours on the sheet now (h, w, 3); lab: the target in OKLab (h, w, 3); corner: row and column
-    of the window's; need: the window, not 0 where the crayon is in question. Elsewhere its gain is UNASKED.
+    current: linear colours on the sheet now (h, w, 3); lab: the target in OKLab (h, w, 3); corner:
+    row and column of the window's; need: the window, not 0 where the crayon is in question.
+    Elsewhere its gain is UNASKED.
     """
     pressures = max(1, int((swatches.pressures <= coat.hardest).sum()))
     gain, best = np.full(need.shape, UNASKED, np.float32), np.zeros(need.shape, np.int8)
@@ -106,9 +116,11 @@ def gains(
 
 
 def wanted(plan: Plan, now: Floats, coat: Pass, cells: float) -> dict[int, Floats]:
-    """The pressure (h, w) wanted of each crayon that is wanted at all: one crayon at most in each place.
+    """The pressure (h, w) wanted of each crayon that is wanted at all: one crayon at most in each
+    place.
 
-    Only shapes are touched up, not tones: the sheet is compared with the photo as it would look in the sheet's own
+    Only shapes are touched up, not tones: the sheet is compared with the photo as it would look in
+        the sheet's own
     tones. now: linear (h, w, 3); cells: width of the tip.
     """
     scene, swatches = plan.scene, plan.swatches
@@ -146,7 +158,9 @@ def _worthiest(
     hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
     own = np.stack([(plan.mixtures.layers == k).any(1) for k in range(len(swatches.names))])
     body = (seen.skin, foreign(swatches, SKIN_RAD)), (seen.hair, foreign(swatches, HAIR_RAD))
-    near = cv2.dilate(need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells)))
+    near = cv2.dilate(
+        need.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=max(1, int(cells))
+    )
     asked = np.asarray(near, np.uint8)
 
     def worth(k: int) -> Floats:
@@ -157,4 +171,6 @@ def _worthiest(
             price += BODY_PRICE * strange[k] * where
         return blur(gain, 0.5 * coat.cohere * cells) - price
 
-    return np.stack(list(plan.pool.map(worth, range(len(swatches.names))))).argmax(0).astype(np.uint8)
+    return (
+        np.stack(list(plan.pool.map(worth, range(len(swatches.names))))).argmax(0).astype(np.uint8)
+    )

@@ -1,4 +1,6 @@
-"""A bench for tests of the wax: blank sheets, a box of test crayons, strokes, with either physics."""
+"""A bench for tests of the wax: blank sheets, a box of test crayons, strokes, with either
+physics.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -34,15 +36,26 @@ class Bench:
     def sheet(self, heights: np.ndarray, cell_mm: float = 0.1) -> Sheet:
         """A blank sheet with a given tooth in um."""
         crayons = self.palette.crayons
-        k, s = np.array([c.k for c in crayons], np.float32), np.array([c.s for c in crayons], np.float32)
+        k, s = (
+            np.array([c.k for c in crayons], np.float32),
+            np.array([c.s for c in crayons], np.float32),
+        )
         return Sheet(heights.astype(np.float32), cell_mm, k, s)
 
-    def felt(self, rows: int, cols: int, cell_mm: float = 0.1, seed: int = 0, wavelength_mm: float = 0.8) -> Sheet:
+    def felt(
+        self, rows: int, cols: int, cell_mm: float = 0.1, seed: int = 0, wavelength_mm: float = 0.8
+    ) -> Sheet:
         """A blank sheet of felt-pressed paper, tooth 45 um."""
-        return self.sheet(tooth(Paper("", "", "felt", wavelength_mm, 45.0), rows, cols, cell_mm, seed), cell_mm)
+        return self.sheet(
+            tooth(Paper("", "", "felt", wavelength_mm, 45.0), rows, cols, cell_mm, seed), cell_mm
+        )
 
-    def stroke(self, path_mm: object, um: float, crayon: str = "red", tip: Tip | None = None) -> Stroke:
-        """A stroke whose force makes a mean overlap of `um` under a blunt tip of 1.6 mm or another tip."""
+    def stroke(
+        self, path_mm: object, um: float, crayon: str = "red", tip: Tip | None = None
+    ) -> Stroke:
+        """A stroke whose force makes a mean overlap of `um` under a blunt tip of 1.6 mm or another
+        tip.
+        """
         tip = tip or Tip("blunt", 1.6)
         path = np.array(path_mm, np.float32).reshape(-1, 2)
         force = um * self.physics.lam * np.pi / 4 * tip.width_mm**2
@@ -56,11 +69,15 @@ class Bench:
         """The same bench with other constants of the wax."""
         return Bench(replace(self.physics, **constants), self.palette)
 
-    def scribble(self, rng: np.random.Generator, number: int, size_mm: float, um: float = 6.0) -> list[Stroke]:
+    def scribble(
+        self, rng: np.random.Generator, number: int, size_mm: float, um: float = 6.0
+    ) -> list[Stroke]:
         """Random strokes of all crayons and tips, some of them over the edge of the sheet."""
         strokes = []
         for _ in range(number):
-            path = rng.uniform(-0.05, 1.05, 2) * size_mm + np.cumsum(rng.normal(0, 1.2, (rng.integers(1, 6), 2)), 0)
+            path = rng.uniform(-0.05, 1.05, 2) * size_mm + np.cumsum(
+                rng.normal(0, 1.2, (rng.integers(1, 6), 2)), 0
+            )
             kind = str(rng.choice(["sharp", "blunt", "rim", "side"]))
             tip = Tip(kind, float(rng.uniform(0.8, 2.0)), float(rng.uniform(0, 360)))
             crayon = str(rng.choice([c.name for c in self.palette.crayons]))
@@ -69,7 +86,9 @@ class Bench:
 
 
 def old_wax(sheet, rng, thickness=12.0):
-    """Cover a sheet with columns of every sort: bare, thin, many layers, a blend under four layers."""
+    """Cover a sheet with columns of every sort: bare, thin, many layers, a blend under four
+    layers.
+    """
     for cell in range(sheet.rows * sheet.cols):
         column = naive.Column(0.0)
         for _ in range(rng.integers(0, 9)):

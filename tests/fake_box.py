@@ -1,4 +1,6 @@
-"""A box of nine made-up crayons as the generator sees them, and a sheet that knows no wax: both need no simulator."""
+"""A box of nine made-up crayons as the generator sees them, and a sheet that knows no wax: both
+need no simulator.
+"""
 
 from itertools import groupby
 
@@ -10,25 +12,36 @@ from stroke_gen.swatches import Swatches, covered, firmness
 PRESSURES = np.array([0.04, 0.1, 0.2, 0.38, 0.62, 0.95], np.float32)
 PAPER = np.array([0.97, 0.97, 0.95], np.float32)
 COLOURS = {  # linear light of a heavy coat
-    "white": (0.95, 0.95, 0.93), "yellow": (0.9, 0.75, 0.05), "pink": (0.85, 0.4, 0.4), "red": (0.6, 0.03, 0.03),
-    "sky": (0.2, 0.5, 0.8), "green": (0.05, 0.35, 0.08), "blue": (0.02, 0.05, 0.4), "brown": (0.12, 0.06, 0.03),
+    "white": (0.95, 0.95, 0.93),
+    "yellow": (0.9, 0.75, 0.05),
+    "pink": (0.85, 0.4, 0.4),
+    "red": (0.6, 0.03, 0.03),
+    "sky": (0.2, 0.5, 0.8),
+    "green": (0.05, 0.35, 0.08),
+    "blue": (0.02, 0.05, 0.4),
+    "brown": (0.12, 0.06, 0.03),
     "black": (0.015, 0.015, 0.015),
-}  # fmt: skip
+}
 
 
 OVER_WAX = 0.6  # wax takes hold of wax as a lighter hand does of paper
 
 
 def box(paper: np.ndarray = PAPER) -> Swatches:
-    """The table of the nine: more pressure covers more of the ground, and wax lets a quarter of it through."""
+    """The table of the nine: more pressure covers more of the ground, and wax lets a quarter of it
+    through.
+    """
     wax = np.array(list(COLOURS.values()), np.float32)[:, None]
     cover, over = (
-        (1 - np.exp(-hold * PRESSURES / 0.25)).astype(np.float32)[None, :, None] for hold in (1.0, OVER_WAX)
+        (1 - np.exp(-hold * PRESSURES / 0.25)).astype(np.float32)[None, :, None]
+        for hold in (1.0, OVER_WAX)
     )
     grain = 0.12 * (1 - np.cbrt(wax.mean(2))) * np.sqrt(cover * (1 - cover))[..., 0]
     a = np.stack([1 - part + 0.25 * part * wax for part in (cover, over)])
     b = np.stack([0.75 * part * wax for part in (cover, over)])
-    return Swatches(tuple(COLOURS), PRESSURES, a, b, grain.astype(np.float32), np.asarray(paper, np.float32))
+    return Swatches(
+        tuple(COLOURS), PRESSURES, a, b, grain.astype(np.float32), np.asarray(paper, np.float32)
+    )
 
 
 class FlatSheet:
@@ -39,7 +52,9 @@ class FlatSheet:
         self.light: np.ndarray | None = None
 
     def look(self, shape):
-        """Linear light (h, w, 3), as `generate` asks for; the first look says how fine the sheet is."""
+        """Linear light (h, w, 3), as `generate` asks for; the first look says how fine the sheet
+        is.
+        """
         if self.light is None:
             self.light = np.tile(self.table.paper, (*shape, 1)).astype(np.float32)
         return self.light.copy()
@@ -53,7 +68,9 @@ class FlatSheet:
             for stroke in part:
                 pressure = float(stroke.force_n.mean()) / (0.785 * width * width) / firmness(width)
                 points = np.round(stroke.path_mm * scale * 16).astype(np.int32)
-                cv2.polylines(level, [points], False, pressure, max(1, round(width * scale[0])), cv2.LINE_8, 4)
+                cv2.polylines(
+                    level, [points], False, pressure, max(1, round(width * scale[0])), cv2.LINE_8, 4
+                )
             self._lay(self.table.names.index(crayon), level)
 
     def _lay(self, k, level):

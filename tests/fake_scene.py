@@ -1,4 +1,6 @@
-"""Scenes made by hand: a photo that is its own work grid, every map of it plain unless it is given."""
+"""Scenes made by hand: a photo that is its own work grid, every map of it plain unless it is
+given.
+"""
 
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -24,8 +26,22 @@ def scene_of(photo: np.ndarray, family: np.ndarray | None = None, **maps) -> Sce
     lab, zero = oklab(photo), np.zeros((h, w), np.float32)
     field = np.dstack([np.full((h, w), v, np.float32) for v in (0.64, -0.77)])
     family = np.zeros((h, w), np.int32) if family is None else family.astype(np.int32)
-    plain = Scene(photo, lab, lab, Guide(lab, 1.4 * TIP), family, family, field, zero, Subject((), zero), zero, zero,
-                  zero, zero, 0.4)  # fmt: skip
+    plain = Scene(
+        photo,
+        lab,
+        lab,
+        Guide(lab, 1.4 * TIP),
+        family,
+        family,
+        field,
+        zero,
+        Subject((), zero),
+        zero,
+        zero,
+        zero,
+        zero,
+        0.4,
+    )
     return replace(plain, **maps)
 
 

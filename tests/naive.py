@@ -1,7 +1,8 @@
 """Slow, obvious twins of the wax and light kernels, for tests to compare with.
 
-A sheet here is a dictionary from (row, col) to a `Column` of plain Python numbers; every step goes over cells
-one by one, in the order and the words of the paper (Figs. 3, 4, 6 and 7), in double precision.
+A sheet here is a dictionary from (row, col) to a `Column` of plain Python numbers; every step goes
+over cells one by one, in the order and the words of the paper (Figs. 3, 4, 6 and 7), in double
+precision.
 """
 
 import itertools
@@ -23,7 +24,8 @@ class Column:
 
     paper: float
     layers: list[list] = field(default_factory=list)
-    blend: np.ndarray = field(default_factory=lambda: np.zeros(7))  # sums of h, k h (rgb), s h (rgb)
+    # sums of h, k h (rgb), s h (rgb)
+    blend: np.ndarray = field(default_factory=lambda: np.zeros(7))
 
     def wax(self) -> float:
         return float(self.blend[0]) + sum(height for _, height in self.layers)
@@ -36,13 +38,18 @@ def columns_of(sheet: Sheet) -> dict[tuple[int, int], Column]:
     """A sheet as columns."""
     made = {}
     for cell in range(sheet.rows * sheet.cols):
-        layers = [[int(sheet.crayon[cell, j]), float(sheet.layer[cell, j])] for j in range(sheet.used[cell])]
+        layers = [
+            [int(sheet.crayon[cell, j]), float(sheet.layer[cell, j])]
+            for j in range(sheet.used[cell])
+        ]
         column = Column(float(sheet.paper[cell]), layers, sheet.blend[cell].astype(float))
         made[divmod(cell, sheet.cols)] = column
     return made
 
 
-def add(column: Column, crayon: int, height: float, optics: np.ndarray, thin: float = THIN_UM) -> None:
+def add(
+    column: Column, crayon: int, height: float, optics: np.ndarray, thin: float = THIN_UM
+) -> None:
     """Lay wax on a column; below films thinner than `thin` it still finds its own colour.
 
     From a column too high the thinnest film under `thin` sinks into the blend, or else the lowest.
@@ -62,7 +69,9 @@ def add(column: Column, crayon: int, height: float, optics: np.ndarray, thin: fl
 
 
 def take(column: Column, height: float) -> tuple[list[list], np.ndarray]:
-    """Lift the topmost `height` off a column: pure layers, topmost first, and a share of the blend."""
+    """Lift the topmost `height` off a column: pure layers, topmost first, and a share of the
+    blend.
+    """
     lifted = []
     while column.layers and height > 0:
         crayon, there = column.layers[-1]
@@ -152,9 +161,11 @@ def height_ahead(tops, y, x, direction) -> tuple[float, float]:
 
 
 def deposit(columns, over, tops, before, direction, own, mask, push, rate, c):
-    """Fig. 6 for all cells in contact: what breaks off joins `own` and wears `mask`; returns the loss.
+    """Fig. 6 for all cells in contact: what breaks off joins `own` and wears `mask`; returns the
+    loss.
 
-    before: wax of each cell before it was smeared; a cell's overlap changes by the firm share of what came and went.
+    before: wax of each cell before it was smeared; a cell's overlap changes by the firm share of
+        what came and went.
     """
     film, mu_paper, mu_wax, relief = (float(v) for v in (c.film, c.mu_paper, c.mu_wax, c.relief))
     wear, heap, firm = float(c.wear), float(c.heap), float(c.firm)
@@ -166,7 +177,9 @@ def deposit(columns, over, tops, before, direction, own, mask, push, rate, c):
         sine = math.sin(math.atan2(relief * rise, way) + math.atan2(push, 1))
         if sine <= 0 or room <= 0:
             continue
-        bare = film / (film + sum(share * now.get(to, 0.0) for to, share in ahead(*cell, direction)))
+        bare = film / (
+            film + sum(share * now.get(to, 0.0) for to, share in ahead(*cell, direction))
+        )
         mu = bare * mu_paper + (1 - bare) * mu_wax
         given = min(rate * mu * sine, 1.0) * room
         own[cell] = own.get(cell, 0.0) + given
@@ -196,24 +209,34 @@ def hop(number: int, mean: float, scatter: float) -> int:
 
 
 def grip(begun, along: float) -> float:
-    """How much more than usual the crayon sticks to the paper: straight lines between a throw at each length."""
+    """How much more than usual the crayon sticks to the paper: straight lines between a throw at
+    each length.
+    """
     x, y = (math.floor(4 * v) for v in begun)
     stroke, step = 7919 * x + 104729 * y, math.floor(along)
     return 2 * np.interp(along - step, [0, 1], [luck(stroke + step), luck(stroke + step + 1)]) - 1
 
 
 def contacts(points, stride):
-    """Where a stroke touches: x, y, force and direction half a stride from its start and at every stride on."""
+    """Where a stroke touches: x, y, force and direction half a stride from its start and at every
+    stride on.
+    """
     ways = np.hypot(*np.diff(points[:, :2], axis=0).T)
     walked = np.append(0.0, np.cumsum(ways))
     for along in np.arange(0.5 * stride, walked[-1], stride):
         segment = int(np.searchsorted(walked[1:-1], along, "right"))
         step = points[segment + 1, :2] - points[segment, :2]
-        yield [float(np.interp(along, walked, points[:, c])) for c in range(3)], step / ways[segment]
+        yield (
+            [float(np.interp(along, walked, points[:, c])) for c in range(3)],
+            step / ways[segment],
+        )
 
 
 def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, reach=1):
-    """One stroke as in Fig. 3: at each point adjust the height, smear, deposit. Returns the wax given."""
+    """One stroke as in Fig. 3: at each point adjust the height, smear, deposit.
+
+    Returns the wax given.
+    """
     c = constants
     points, mask = points.astype(float), mask.astype(float)
     side = mask.shape[0]
@@ -231,11 +254,16 @@ def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, reach
             continue
         dither_x, dither_y = (0.5 + contact * 0.7548776662) % 1, (0.5 + contact * 0.5698402910) % 1
         contact += 1
-        left, top = math.floor(x - 0.5 + dither_x) - side // 2, math.floor(y - 0.5 + dither_y) - side // 2
+        left, top = (
+            math.floor(x - 0.5 + dither_x) - side // 2,
+            math.floor(y - 0.5 + dither_y) - side // 2,
+        )
         gaps = under_tip(columns, mask, top, left, float(c.firm))
         if not gaps:
             continue
-        held = 1 + float(c.slip) * grip(np.float32(touches[0][0][:2]) / c.slip_cells, n * stride / float(c.slip_cells))
+        held = 1 + float(c.slip) * grip(
+            np.float32(touches[0][0][:2]) / c.slip_cells, n * stride / float(c.slip_cells)
+        )
         wanted = force * per_lambda * held * len(gaps) / int((mask < 1e8).sum())
         h = balance(list(gaps.values()), min(wanted, float(c.most) * len(gaps)))
         over = {cell: gap - h for cell, gap in gaps.items() if gap > h}
@@ -244,7 +272,19 @@ def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, reach
         if smears:
             nu = 1 - (1 - float(c.nu)) ** stride
             cells = hop(n, float(c.hop), float(c.scatter))
-            own = smear(columns, over, tops, direction, wax, nu, c.alpha, c.beta, optics, cells, float(c.yields))
+            own = smear(
+                columns,
+                over,
+                tops,
+                direction,
+                wax,
+                nu,
+                c.alpha,
+                c.beta,
+                optics,
+                cells,
+                float(c.yields),
+            )
         worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
         push, rate = float(c.push) if c.push > 0 else force, float(c.rate) * stride
         given += deposit(columns, over, tops, before, direction, own, worn, push, rate, c)
@@ -272,10 +312,17 @@ def over(ground: float, kh: float, sh: float) -> float:
     return r + t * t * ground / (1 - r * ground)
 
 
-def colour(column: Column, ground, optics: np.ndarray, surface: float = 0.0, film_um: float = 1.0) -> np.ndarray:
-    """Light that comes back from a column: its layers over each other, bottom up, and what its surface reflects."""
+def colour(
+    column: Column, ground, optics: np.ndarray, surface: float = 0.0, film_um: float = 1.0
+) -> np.ndarray:
+    """Light that comes back from a column: its layers over each other, bottom up, and what its
+    surface reflects.
+    """
     seen = [float(g) for g in ground]
-    layers = [column.blend[1:], *(height * optics[crayon].astype(float) for crayon, height in column.layers)]
+    layers = [
+        column.blend[1:],
+        *(height * optics[crayon].astype(float) for crayon, height in column.layers),
+    ]
     for layer in layers:
         seen = [over(seen[c], layer[c], layer[3 + c]) for c in range(3)]
     front = surface * column.wax() / (column.wax() + film_um)
@@ -293,9 +340,15 @@ def levels(points, first, reach, rows, cols, tile) -> list[int]:
             dense += [p + (q - p) * (i + 1) / parts for i in range(parts)]
         tiles = set()
         for x, y in dense:
-            for ty in range(math.floor((y - reach[s]) / tile), math.floor((y + reach[s]) / tile) + 1):
-                for tx in range(math.floor((x - reach[s]) / tile), math.floor((x + reach[s]) / tile) + 1):
+            for ty in range(
+                math.floor((y - reach[s]) / tile), math.floor((y + reach[s]) / tile) + 1
+            ):
+                for tx in range(
+                    math.floor((x - reach[s]) / tile), math.floor((x + reach[s]) / tile) + 1
+                ):
                     if 0 <= ty < -(-rows // tile) and 0 <= tx < -(-cols // tile):
                         tiles.add((ty, tx))
-        done.append((tiles, max((level + 1 for before, level in done if before & tiles), default=0)))
+        done.append(
+            (tiles, max((level + 1 for before, level in done if before & tiles), default=0))
+        )
     return [level for _, level in done]

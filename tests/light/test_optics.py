@@ -10,7 +10,8 @@ from crayonize.light import optics
 from crayonize.wax.physics import physics
 
 over = optics._over
-FRONT, FILM_UM = 0.0325, 0.5  # what wax of refractive index 1.44 reflects, and the film that does half of it
+# what wax of refractive index 1.44 reflects, and the film that does half of it
+FRONT, FILM_UM = 0.0325, 0.5
 
 
 @pytest.fixture
@@ -38,7 +39,7 @@ def random_layers(number):
     return np.float32(kh), np.float32(sh), rng.random(number, np.float32)
 
 
-# ---- one layer --------------------------------------------------------------------------------------------
+# ---- one layer -----------------------------------------------------------------------------------
 
 
 def test_a_layer_is_kubelkas_formula():
@@ -61,7 +62,9 @@ def test_a_layer_split_in_two_gives_the_same_colour():
     for kh, sh, ground in zip(*random_layers(3000), strict=True):
         share = np.float32(rng.random())
         lower = over(ground, share * kh, share * sh)
-        assert over(lower, (1 - share) * kh, (1 - share) * sh) == pytest.approx(over(ground, kh, sh), abs=2e-5)
+        assert over(lower, (1 - share) * kh, (1 - share) * sh) == pytest.approx(
+            over(ground, kh, sh), abs=2e-5
+        )
 
 
 def test_no_wax_shows_the_ground_and_much_wax_hides_it():
@@ -86,7 +89,7 @@ def test_two_grounds_give_back_absorption_and_scattering():
         assert (found_s, found_s * (a - 1)) == pytest.approx((sh, kh), rel=5e-3)
 
 
-# ---- columns of wax ---------------------------------------------------------------------------------------
+# ---- columns of wax ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("ground", [(1.0, 1.0, 1.0), (0.02, 0.01, 0.015), (0.9, 0.6, 0.3)])
@@ -96,8 +99,12 @@ def test_a_picture_is_its_columns_bottom_up(table, ground):
     picture = optics.render(sheet, ground, light=False)
     assert picture.dtype == np.float32 and picture.shape == (23, 31, 3)
     for at, column in naive.columns_of(sheet).items():
-        np.testing.assert_allclose(picture[at], naive.colour(column, ground, sheet.optics, FRONT, FILM_UM), atol=2e-5)
-    np.testing.assert_array_equal(picture[sheet.film_um() == 0], np.float32(ground) + 0 * picture[sheet.film_um() == 0])
+        np.testing.assert_allclose(
+            picture[at], naive.colour(column, ground, sheet.optics, FRONT, FILM_UM), atol=2e-5
+        )
+    np.testing.assert_array_equal(
+        picture[sheet.film_um() == 0], np.float32(ground) + 0 * picture[sheet.film_um() == 0]
+    )
 
 
 def test_a_split_film_and_a_sunk_film_look_the_same(table):
@@ -106,11 +113,15 @@ def test_a_split_film_and_a_sunk_film_look_the_same(table):
     sheet = table.sheet(np.zeros((1, 1)))
     sheet.total[0] = sheet.blend[0, 0] = 7.0
     sheet.blend[0, 1:] = 7.0 * sheet.optics[2]
-    np.testing.assert_allclose(optics.render(sheet, (1.0, 1.0, 1.0), light=False)[0, 0], whole, atol=1e-5)
+    np.testing.assert_allclose(
+        optics.render(sheet, (1.0, 1.0, 1.0), light=False)[0, 0], whole, atol=1e-5
+    )
 
 
 def test_the_order_of_layers_matters(table):
-    yellow_on_blue, blue_on_yellow = films(table, [[("blue", 6), ("yellow", 6)], [("yellow", 6), ("blue", 6)]])
+    yellow_on_blue, blue_on_yellow = films(
+        table, [[("blue", 6), ("yellow", 6)], [("yellow", 6), ("blue", 6)]]
+    )
     assert np.abs(yellow_on_blue - blue_on_yellow).max() > 0.03
     assert yellow_on_blue[0] > blue_on_yellow[0]  # what lies on top colours more
     for mixed in (yellow_on_blue, blue_on_yellow):
@@ -119,7 +130,12 @@ def test_the_order_of_layers_matters(table):
 
 def test_colours_stay_visible_on_black_paper(table):
     black = (0.01, 0.01, 0.01)
-    for crayon, (high, low) in {"red": (0, 2), "yellow": (0, 2), "blue": (2, 0), "green": (1, 0)}.items():
+    for crayon, (high, low) in {
+        "red": (0, 2),
+        "yellow": (0, 2),
+        "blue": (2, 0),
+        "green": (1, 0),
+    }.items():
         thin, usual = films(table, [[(crayon, 3.0)], [(crayon, 12.0)]], black)
         on_white = films(table, [[(crayon, 12.0)]])[0]
         assert usual[high] > thin[high] > 1.5 * black[0]
@@ -133,7 +149,7 @@ def test_more_wax_takes_a_colour_further_from_the_paper(table):
     assert (np.diff(seen[:, 1]) < 0).all() and (np.diff(seen[:, 2]) < 0).all()
 
 
-# ---- the lamp ---------------------------------------------------------------------------------------------
+# ---- the lamp ------------------------------------------------------------------------------------
 
 
 def test_the_lamp_can_be_switched_off(table, monkeypatch):
@@ -152,7 +168,9 @@ def test_the_lamp_can_be_switched_off(table, monkeypatch):
 
 @pytest.mark.parametrize("um_a_cell", [0.2, 1.0, 5.0])
 def test_a_slope_of_wax_is_lit_by_its_rise_and_bounded(table, um_a_cell, monkeypatch):
-    """.7 % brighter for each 1/100 that wax rises away from the lamp, and never more than a twelfth."""
+    """.7 % brighter for each 1/100 that wax rises away from the lamp, and never more than a
+    twelfth.
+    """
     monkeypatch.setattr(optics, "FRONT", 0.0)
     y, x = np.mgrid[:9, :9]
     sheet = table.sheet(np.zeros((9, 9)))
@@ -163,7 +181,9 @@ def test_a_slope_of_wax_is_lit_by_its_rise_and_bounded(table, um_a_cell, monkeyp
 
 
 def test_the_front_surface_reflects_what_does_not_enter(table):
-    """Fresnel's 3.25 % at n = 1.44: the darkest wax is L* 21, white stays white, a bare sheet is as it was."""
+    """Fresnel's 3.25 % at n = 1.44: the darkest wax is L* 21, white stays white, a bare sheet is as
+    it was.
+    """
     black, bare = films(table, [[("black", 200.0)], []])
     inside = 1 + 0.3 / 0.004 - np.sqrt((0.3 / 0.004) ** 2 + 2 * 0.3 / 0.004)
     assert black[0] == pytest.approx(0.0325 + 0.9675 * inside, rel=0.02)
@@ -244,5 +264,8 @@ def test_the_reduced_picture_is_a_mean_over_areas(waxed):
     picture = optics.render(waxed, (1.0, 0.9, 0.8), light=False).astype(np.float64)
     for rows, cols in ((61, 30), (17, 9), (1, 1)):
         seen = optics.render_reduced(waxed, (1.0, 0.9, 0.8), (rows, cols))
-        fine = np.repeat(np.repeat(picture, rows, 0), cols, 1)  # each cell of the grid is now 61 x 30 of these
-        np.testing.assert_allclose(seen, fine.reshape(rows, 61, cols, 30, 3).mean((1, 3)), atol=2e-6)
+        # each cell of the grid is now 61 x 30 of these
+        fine = np.repeat(np.repeat(picture, rows, 0), cols, 1)
+        np.testing.assert_allclose(
+            seen, fine.reshape(rows, 61, cols, 30, 3).mean((1, 3)), atol=2e-6
+        )

@@ -1,21 +1,24 @@
-"""Is it a drawing? Measures hatching, paper, borders and strokes of real drawings; one JSON row a photo.
+"""Is it a drawing? Measures hatching, paper, borders and strokes of real drawings; one JSON row a
+photo.
 
 usage: python -m tests.criteria [--style STYLE] [--size PIXELS] PHOTO ...
 
 D is the width of the style's usual tip. In brackets what a good drawing of style artist reaches.
-follow    5  strokes against the field their coat was given: mean cos of twice the angle, by length  (> 0.9)
-form      5  the same against the form of the photo, without the angle between coats  (> 0.75)
-hatch     5  what is seen: direction of the lightness finer than D against the form, by energy  (>= 0.09)
-plain     5  the same where the photo itself is plain, so that only hatching can have a direction  (>= 0.09)
-kept      5  plain, over that of all coats but the touches  (>= 0.75)
+follow    5  strokes against the field their coat was given: mean cos of twice the angle, by length
+(> 0.9) form      5  the same against the form of the photo, without the angle between coats  (>
+0.75)
+hatch     5  what is seen: direction of the lightness finer than D against the form, by energy  (>=
+0.09) plain     5  the same where the photo itself is plain, so that only hatching can have a
+direction  (>= 0.09) kept      5  plain, over that of all coats but the touches  (>= 0.75)
 covered   7  share of the ground that is not to be paper within reach of a stroke  (>= 0.85)
 wax       7  share of the same ground with wax on it: the paper's valleys stay bare
-reserve   7  share of what is to be bare paper (L* > 93, chroma < 6) without wax  (>= 0.9), null if little is
-frame     7  wax in the outer 2 D of the sheet over wax inside, where paper is not wanted  (>= 0.9)
-over      8  how far wax, but for touches, lies outside the surfaces made of it, in D: median and 95 %  (<= 0.2, 0.8)
-spilt     8  share of their wax that lies outside  (<= 0.04)
-slip      8  how far lines run beyond the ground that wants them, in D: median and 95 % of all strokes
-strokes   9  number, and per megapixel  (<= 15000)
+reserve   7  share of what is to be bare paper (L* > 93, chroma < 6) without wax  (>= 0.9), null if
+little is frame     7  wax in the outer 2 D of the sheet over wax inside, where paper is not wanted
+(>= 0.9)
+over      8  how far wax, but for touches, lies outside the surfaces made of it, in D: median and 95
+%  (<= 0.2, 0.8) spilt     8  share of their wax that lies outside  (<= 0.04)
+slip      8  how far lines run beyond the ground that wants them, in D: median and 95 % of all
+strokes strokes   9  number, and per megapixel  (<= 15000)
 length    9  of hatching strokes in D: median and 95 %  (6 to 15, <= 40)
 first     9  the same without touches
 travel    9  length of all strokes in D per megapixel  (<= 48000)
@@ -114,7 +117,7 @@ def measure(photo: Floats, settings: Settings) -> dict[str, Any]:
     }
 
 
-# ---- 5: hatching -------------------------------------------------------------------------------------------
+# ---- 5: hatching ---------------------------------------------------------------------------------
 
 
 def directions(
@@ -157,12 +160,15 @@ def followed(pairs: list[tuple[Hatching, Floats]], cell_mm: float) -> float | No
 
 
 def alignment(light: Floats, tangent: Floats, tip: float, where: Mask) -> float | None:
-    """How well the fine structure of a lightness (h, w) runs along a field: 1 along, 0 anyhow, -1 across.
+    """How well the fine structure of a lightness (h, w) runs along a field: 1 along, 0 anyhow, -1
+    across.
 
-    tip: width of the crayon in pixels. The tangent of what is finer than a tip is compared with the field by
-    the cosine of twice the angle, weighted by the energy of the gradient.
+    tip: width of the crayon in pixels. The tangent of what is finer than a tip is compared with the
+    field by the cosine of twice the angle, weighted by the energy of the gradient.
     """
-    fine = cv2.GaussianBlur(light, (0, 0), max(0.1 * tip, 0.5)) - cv2.GaussianBlur(light, (0, 0), tip)
+    fine = cv2.GaussianBlur(light, (0, 0), max(0.1 * tip, 0.5)) - cv2.GaussianBlur(
+        light, (0, 0), tip
+    )
     gx, gy = (cv2.Scharr(fine, cv2.CV_32F, dx, 1 - dx) for dx in (1, 0))
     c, s = tangent[..., 0], tangent[..., 1]
     cos2, sin2 = c * c - s * s, 2 * c * s
@@ -178,7 +184,7 @@ def plain_ground(light: Floats, tip: float) -> Mask:
     return np.asarray(spread < 2.0**2)
 
 
-# ---- 7: paper ----------------------------------------------------------------------------------------------
+# ---- 7: paper ------------------------------------------------------------------------------------
 
 
 def paper(plan: Plan, drawing: Drawing, easel: Easel, style: Style) -> dict[str, float | None]:
@@ -202,7 +208,9 @@ def paper(plan: Plan, drawing: Drawing, easel: Easel, style: Style) -> dict[str,
     }
 
 
-def bands(strokes: tuple[Stroke, ...] | list[Stroke], shape: tuple[int, int], cell_mm: float) -> Iterator[Mask]:
+def bands(
+    strokes: tuple[Stroke, ...] | list[Stroke], shape: tuple[int, int], cell_mm: float
+) -> Iterator[Mask]:
     """The ground under the strokes of each coat and crayon, as wide as their tips."""
     kinds: dict[tuple[str, str, float], list[Stroke]] = {}
     for stroke in strokes:
@@ -214,7 +222,7 @@ def bands(strokes: tuple[Stroke, ...] | list[Stroke], shape: tuple[int, int], ce
         yield mask > 0
 
 
-# ---- 8: borders --------------------------------------------------------------------------------------------
+# ---- 8: borders ----------------------------------------------------------------------------------
 
 
 def borders(record: Record, plan: Plan, style: Style) -> dict[str, Any]:
@@ -253,7 +261,7 @@ def furthest(path: Floats, beyond: Floats) -> float:
     return float(beyond[y, x].max())
 
 
-# ---- 9: strokes --------------------------------------------------------------------------------------------
+# ---- 9: strokes ----------------------------------------------------------------------------------
 
 
 def statistics(record: Record, drawing: Drawing, easel: Easel, style: Style) -> dict[str, Any]:
@@ -261,12 +269,16 @@ def statistics(record: Record, drawing: Drawing, easel: Easel, style: Style) -> 
     megapixels, tip = shape[0] * shape[1] / 1e6, style.tip_mm
     lengths = [float(np.hypot(*np.diff(s.path_mm, axis=0).T).sum()) / tip for s in drawing.strokes]
     kinds = {coat.name: coat.kind for coat in style.passes}
-    hatched = [(n, kinds[s.note]) for n, s in zip(lengths, drawing.strokes, strict=True) if s.note in kinds]
+    hatched = [
+        (n, kinds[s.note]) for n, s in zip(lengths, drawing.strokes, strict=True) if s.note in kinds
+    ]
     covered, areas = np.zeros(shape, np.bool_), 0
     for band in bands(drawing.strokes, shape, easel.sheet.cell_mm):
         covered |= band
         areas += int(band.sum())
-    turns = np.concatenate([np.zeros(1), *(turning(h, 0.3 * tip) for h in record.hatchings if h.strokes)])
+    turns = np.concatenate(
+        [np.zeros(1), *(turning(h, 0.3 * tip) for h in record.hatchings if h.strokes)]
+    )
     return {
         "strokes": [len(drawing.strokes), round(len(drawing.strokes) / megapixels)],
         "length": percentiles([n for n, _ in hatched]),
@@ -294,7 +306,7 @@ def turning(laid: Hatching, over_mm: float) -> NDArray[np.float64]:
     return np.concatenate(turns)
 
 
-# ---- pictures ----------------------------------------------------------------------------------------------
+# ---- pictures ------------------------------------------------------------------------------------
 
 
 def enlarged(image: Floats, shape: tuple[int, int]) -> Floats:

@@ -1,4 +1,6 @@
-"""The figures of criteria.py themselves: on patterns whose answer is known, and once on a drawing."""
+"""The figures of criteria.py themselves: on patterns whose answer is known, and once on a
+drawing.
+"""
 
 import criteria
 import cv2
@@ -69,7 +71,9 @@ def test_distances():
     area = np.zeros(SHAPE, np.bool_)
     area[:, :50] = True
     beyond = criteria.distance(area)
-    assert criteria.furthest(np.array([[10.0, 10.0], [59.5, 60.0]]), beyond) == pytest.approx(10, abs=0.6)
+    assert criteria.furthest(np.array([[10.0, 10.0], [59.5, 60.0]]), beyond) == pytest.approx(
+        10, abs=0.6
+    )
     assert criteria.furthest(np.array([[10.0, 10.0]]), beyond) == 0
 
 

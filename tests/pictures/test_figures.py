@@ -1,4 +1,6 @@
-"""The paper's figures and the two hand-written drawings: do they show what the paper's text says of them?"""
+"""The paper's figures and the two hand-written drawings: do they show what the paper's text says of
+them?
+"""
 
 import importlib.util
 import json
@@ -48,13 +50,17 @@ def test_all_figures_are_written(figures, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["figures.py", str(tmp_path / "out"), "--cell", "0.5"])
     figures.main()
     paths = capsys.readouterr().out.split()
-    assert [Path(path).name for path in paths] == [f"fig{n}.png" for n in ("01", "05", "08", "10", "11")]
+    assert [Path(path).name for path in paths] == [
+        f"fig{n}.png" for n in ("01", "05", "08", "10", "11")
+    ]
     for path in paths:
         assert read_linear(path, None).std() > 0.02, path
 
 
 def test_fig01_wax_takes_the_texture_of_the_paper(figures):
-    """Wax on the stipple paper repeats from dot to dot (1.2 mm), wax on the lunar paper does not."""
+    """Wax on the stipple paper repeats from dot to dot (1.2 mm), wax on the lunar paper does
+    not.
+    """
     cell = 0.1  # on larger ones the dots run together
     period = round(1.2 / cell)
     alike = []
@@ -79,19 +85,26 @@ def test_fig08_smearing_carries_wax_into_the_valleys(figures):
     tooth = alone.sheet.paper.reshape(alone.sheet.rows, alone.sheet.cols)
     valley = tooth < np.median(tooth)
     before, after = (
-        part((easel.sheet.film_um() > 0.5) & valley, easel, 4, 4, 22, 15).mean() for easel in (alone, smeared)
+        part((easel.sheet.film_um() > 0.5) & valley, easel, 4, 4, 22, 15).mean()
+        for easel in (alone, smeared)
     )
     assert after > 1.3 * before
 
 
 def test_fig10_crayons_show_on_white_and_on_black(figures):
-    """Heavy wax takes a third of some channel's light from white paper and doubles one on black; light wax less."""
-    for easel, silent, least in zip(figures.crayons(CELL), ("white", "black"), (0.33, 1.0), strict=True):
+    """Heavy wax takes a third of some channel's light from white paper and doubles one on black;
+    light wax less.
+    """
+    for easel, silent, least in zip(
+        figures.crayons(CELL), ("white", "black"), (0.33, 1.0), strict=True
+    ):
         change = np.abs(easel.picture(light=False) / np.array(easel.ground, np.float32) - 1)
         for i, crayon in enumerate(easel.box.palette.crayons):
             left, side = figures.SIDE * i, figures.SIDE
             light, heavy = (
-                part(change, easel, left + 3, top + 3, left + side - 3, top + side - 3).mean((0, 1)).max()
+                part(change, easel, left + 3, top + 3, left + side - 3, top + side - 3)
+                .mean((0, 1))
+                .max()
                 for top in (0.0, side)
             )
             if crayon.name != silent:
@@ -106,7 +119,9 @@ def test_fig11_a_second_crayon_prefers_bare_paper(figures):
     both = figures.drawn("lunar", 30, 30, [below], CELL)
     film = part(both.sheet.film_um().copy(), both, 5, 5, 25, 25)
     both.draw([above])
-    first, second = (part(wax_of(easel, "sea green"), easel, 5, 5, 25, 25) for easel in (alone, both))
+    first, second = (
+        part(wax_of(easel, "sea green"), easel, 5, 5, 25, 25) for easel in (alone, both)
+    )
     assert second[film < 0.3].mean() > first[film < 0.3].mean()
     assert second[film > 4].mean() < 0.8 * first[film > 4].mean()
 
@@ -127,7 +142,12 @@ def test_sample_drawings_can_be_read_and_drawn(path):
 def test_sample_drawings_are_fit_for_reading(path):
     """Numbers have one decimal, every stroke says what it draws."""
     strokes = json.loads(path.read_text("utf-8"))["strokes"]
-    assert all(round(value, 1) == value for stroke in strokes for point in stroke["path"] for value in point)
+    assert all(
+        round(value, 1) == value
+        for stroke in strokes
+        for point in stroke["path"]
+        for value in point
+    )
     assert all(stroke["note"] for stroke in strokes)
 
 

@@ -66,7 +66,9 @@ def test_far_sight_averages_light_not_codes():
 
 def test_fit_averages_light():
     picture = np.random.default_rng(3).random((90, 120, 3)).astype(np.float32)
-    assert np.allclose(analysis.fit(picture, (30, 40)), picture.reshape(30, 3, 40, 3, 3).mean((1, 3)), atol=1e-5)
+    assert np.allclose(
+        analysis.fit(picture, (30, 40)), picture.reshape(30, 3, 40, 3, 3).mean((1, 3)), atol=1e-5
+    )
     assert analysis.fit(picture[:2, :2], (40, 50)).shape == (40, 50, 3)
 
 
@@ -76,7 +78,7 @@ def test_work_grid_is_as_long_for_every_sheet(size):
     assert max(rows, cols) == analysis.WORK_LONG and min(rows, cols) >= 2
 
 
-# ---- tone ------------------------------------------------------------------------------------------------
+# ---- tone ----------------------------------------------------------------------------------------
 
 
 HIGHEST_LIFT = get_type_hints(Style, include_extras=True)["lift"].__metadata__[1]
@@ -125,7 +127,9 @@ def test_tones_above_the_knee_are_kept():
     light, given = lab[0, :, 0], analysis.tone_map(lab, table, Style())[0, :, 0]
     kept = (light > table.lightness().min() + analysis.KNEE) & (light < analysis.WHITE)
     assert kept.sum() > 200 and np.abs(given - light)[kept].max() < 1e-6
-    assert (given >= light - 1e-6)[light < table.lightness().min()].all(), "darks are lifted, never sunk"
+    assert (given >= light - 1e-6)[light < table.lightness().min()].all(), (
+        "darks are lifted, never sunk"
+    )
 
 
 def test_what_is_nearly_white_and_grey_becomes_paper_and_what_has_colour_does_not():
@@ -146,10 +150,13 @@ def test_hue_is_kept_and_chroma_follows_the_style():
     assert np.allclose(plain[..., 1:], lab[..., 1:], atol=1e-5)
     assert np.allclose(rich[..., 1:], 1.5 * lab[..., 1:], atol=1e-5)
     skin = analysis.tone_map(lab, box(), Style(skin=1.0))
-    assert (np.hypot(*np.moveaxis(skin[..., 1:], 2, 0)) >= np.hypot(*np.moveaxis(lab[..., 1:], 2, 0)) - 1e-6).all()
+    assert (
+        np.hypot(*np.moveaxis(skin[..., 1:], 2, 0))
+        >= np.hypot(*np.moveaxis(lab[..., 1:], 2, 0)) - 1e-6
+    ).all()
 
 
-# ---- detail ----------------------------------------------------------------------------------------------
+# ---- detail --------------------------------------------------------------------------------------
 
 
 def test_detail_lies_where_small_things_are():

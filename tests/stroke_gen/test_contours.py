@@ -41,8 +41,12 @@ def steady(**changes):
 def strokes_of(photo, style, seed=0, table=None, mask=None):
     table = table or box()
     sheet = FlatSheet(WIDTH, HEIGHT, table)
-    who = Subject((), np.zeros(analysis.work_shape(WIDTH, HEIGHT), np.float32) if mask is None else mask)
-    return generate(photo, who, WIDTH, HEIGHT, table, style, seed, draw=sheet.draw, look=sheet.look, threads=2)
+    who = Subject(
+        (), np.zeros(analysis.work_shape(WIDTH, HEIGHT), np.float32) if mask is None else mask
+    )
+    return generate(
+        photo, who, WIDTH, HEIGHT, table, style, seed, draw=sheet.draw, look=sheet.look, threads=2
+    )
 
 
 def outlines(photo, style, seed=0, table=None, mask=None):
@@ -91,7 +95,9 @@ def test_child_closes_its_outlines():
     rings = [s for s in outlines(disc(), style) if round_the_disc(s) >= 360]
     assert len(rings) >= 2, "before the fill and once more after it"
     for stroke in rings:
-        closing = np.linalg.norm(stroke.path_mm - stroke.path_mm[-1], axis=1)[: len(stroke.path_mm) // 4].min()
+        closing = np.linalg.norm(stroke.path_mm - stroke.path_mm[-1], axis=1)[
+            : len(stroke.path_mm) // 4
+        ].min()
         assert closing < 1.0, "mm: the end runs past the beginning"
 
 
@@ -123,8 +129,12 @@ def test_flat_pictures_have_no_outlines(light, closed):
 
 
 def test_more_lines_for_more_budget_and_none_for_none():
-    noise = np.random.default_rng(0).random((30, 40, 3)).astype(np.float32).repeat(8, 0).repeat(8, 1)
-    lengths = [sum(map(length, outlines(noise, steady(lines=amount)))) for amount in (0.0, 0.2, 0.6)]
+    noise = (
+        np.random.default_rng(0).random((30, 40, 3)).astype(np.float32).repeat(8, 0).repeat(8, 1)
+    )
+    lengths = [
+        sum(map(length, outlines(noise, steady(lines=amount)))) for amount in (0.0, 0.2, 0.6)
+    ]
     assert lengths[0] == 0 and 0 < lengths[1] < lengths[2]
     assert lengths[1] <= 0.2 * 7 * WIDTH * 1.1
 
@@ -135,7 +145,10 @@ def test_strong_edges_come_first():
     y, x = np.mgrid[:300, :400] / 2
     photo[np.hypot(x - 165, y - 120) < 20] = (0.35, 0.35, 0.35)
     little, more = (outlines(photo, steady(lines=amount)) for amount in (0.1, 1.0))
-    near = [[np.linalg.norm(s.path_mm - CENTRE, axis=1).max() < RADIUS + 2 for s in lines] for lines in (little, more)]
+    near = [
+        [np.linalg.norm(s.path_mm - CENTRE, axis=1).max() < RADIUS + 2 for s in lines]
+        for lines in (little, more)
+    ]
     assert near[0] and all(near[0])
     assert not all(near[1]) and sum(near[1]) >= len(near[0])
 
@@ -158,8 +171,12 @@ def test_silhouettes_come_first():
 
 @pytest.mark.parametrize("style", ["artist", "sketch", "fine", "solid", "child"])
 def test_lines_stay_inside_the_margin(style):
-    photo = np.random.default_rng(2).random((6, 8, 3)).astype(np.float32).repeat(40, 0).repeat(40, 1)
-    style = replace(load_style(style), wobble=0.0, overshoot=0.0, margin_mm=15.0, fade=0.0, search=1)
+    photo = (
+        np.random.default_rng(2).random((6, 8, 3)).astype(np.float32).repeat(40, 0).repeat(40, 1)
+    )
+    style = replace(
+        load_style(style), wobble=0.0, overshoot=0.0, margin_mm=15.0, fade=0.0, search=1
+    )
     lines = outlines(photo, style)
     points = np.concatenate([s.path_mm for s in lines])
     outside = (points < 12).any(1) | (points > np.array([WIDTH, HEIGHT]) - 12).any(1)
@@ -171,12 +188,16 @@ def test_a_line_is_darker_than_both_sides_of_it():
     table, photo = box(), disc((0.25, 0.12, 0.06), (0.35, 0.3, 0.25))
     sheet = FlatSheet(WIDTH, HEIGHT, table)
     who = Subject((), np.zeros(analysis.work_shape(WIDTH, HEIGHT), np.float32))
-    generate(photo, who, WIDTH, HEIGHT, table, steady(), 0, draw=sheet.draw, look=sheet.look, threads=2)
+    generate(
+        photo, who, WIDTH, HEIGHT, table, steady(), 0, draw=sheet.draw, look=sheet.look, threads=2
+    )
     light = oklab(sheet.light)[..., 0]
     y, x = np.mgrid[: light.shape[0], : light.shape[1]] * (WIDTH / light.shape[1])
     off = np.hypot(x - CENTRE[0], y - CENTRE[1]) - RADIUS
-    line, inner, outer = (np.median(light[on]) for on in (np.abs(off) < 0.5, (off < -6) & (off > -15),
-                                                          (off > 6) & (off < 15)))  # fmt: skip
+    line, inner, outer = (
+        np.median(light[on])
+        for on in (np.abs(off) < 0.5, (off < -6) & (off > -15), (off > 6) & (off < 15))
+    )
     assert line < inner - 0.04 and line < outer - 0.04
 
 
@@ -189,7 +210,9 @@ def test_a_line_is_drawn_as_often_as_the_hand_searches():
 
 def test_light_lines_before_dark_ones():
     table = box()
-    noise = np.random.default_rng(1).random((6, 8, 3)).astype(np.float32).repeat(40, 0).repeat(40, 1)
+    noise = (
+        np.random.default_rng(1).random((6, 8, 3)).astype(np.float32).repeat(40, 0).repeat(40, 1)
+    )
     lines = outlines(noise, steady(), table=table)
     lightness = dict(zip(table.names, table.lightness(), strict=True))
     assert np.diff([lightness[s.crayon] for s in lines]).max() <= 1e-6

@@ -1,4 +1,6 @@
-"""The generator as a whole: any picture gives strokes that can be drawn, the same ones for the same seed."""
+"""The generator as a whole: any picture gives strokes that can be drawn, the same ones for the same
+seed.
+"""
 
 from dataclasses import replace
 
@@ -63,12 +65,23 @@ def logo(ground):
 
 
 PICTURES = {
-    "1x1": noise(1, 1), "1x600": noise(1, 600), "600x1": noise(600, 1), "2x2": noise(2, 2), "tiny": noise(16, 16),
-    "white": np.ones((60, 80, 3), np.float32), "black": np.zeros((60, 80, 3), np.float32),
-    "grey": np.full((60, 80, 3), 0.2, np.float32), "noise": noise(150, 110), "lines": line_art(),
-    "logo": logo((1.0, 1.0, 1.0)), "logo on black": logo((0.012, 0.011, 0.012)), "fog": waves(0.5, 0.51),
-    "night": waves(0.0, 0.08, (0.6, 0.8, 1.0)), "high-key": waves(0.7, 1.0, (1.0, 0.98, 0.95)), "clouds": clouds(),
-}  # fmt: skip
+    "1x1": noise(1, 1),
+    "1x600": noise(1, 600),
+    "600x1": noise(600, 1),
+    "2x2": noise(2, 2),
+    "tiny": noise(16, 16),
+    "white": np.ones((60, 80, 3), np.float32),
+    "black": np.zeros((60, 80, 3), np.float32),
+    "grey": np.full((60, 80, 3), 0.2, np.float32),
+    "noise": noise(150, 110),
+    "lines": line_art(),
+    "logo": logo((1.0, 1.0, 1.0)),
+    "logo on black": logo((0.012, 0.011, 0.012)),
+    "fog": waves(0.5, 0.51),
+    "night": waves(0.0, 0.08, (0.6, 0.8, 1.0)),
+    "high-key": waves(0.7, 1.0, (1.0, 0.98, 0.95)),
+    "clouds": clouds(),
+}
 
 
 def sheet_mm(photo):
@@ -86,7 +99,18 @@ def strokes_for(photo, style="artist", seed=0, table=TABLE, threads=2, who=None,
     width, height = sheet_mm(photo)
     sheet = FlatSheet(width, height, table)
     hand = {"draw": sheet.draw, "look": sheet.look}
-    return generate(photo, who or nobody(photo), width, height, table, style, seed, threads=threads, **hand, **options)
+    return generate(
+        photo,
+        who or nobody(photo),
+        width,
+        height,
+        table,
+        style,
+        seed,
+        threads=threads,
+        **hand,
+        **options,
+    )
 
 
 def in_stages(photo, style="artist", **options):
@@ -98,7 +122,18 @@ def in_stages(photo, style="artist", **options):
         sheet.draw(strokes)
 
     style = load_style(style) if isinstance(style, str) else style
-    generate(photo, nobody(photo), *sheet_mm(photo), TABLE, style, 0, draw=draw, look=sheet.look, threads=2, **options)
+    generate(
+        photo,
+        nobody(photo),
+        *sheet_mm(photo),
+        TABLE,
+        style,
+        0,
+        draw=draw,
+        look=sheet.look,
+        threads=2,
+        **options,
+    )
     return drawn
 
 
@@ -128,11 +163,12 @@ def same(one, two):
     )  # fmt: skip
 
 
-# ---- any picture -------------------------------------------------------------------------------------------
+# ---- any picture ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    "style, name", [("artist", "1x600"), ("artist", "600x1"), *(("child", name) for name in PICTURES)]
+    "style, name",
+    [("artist", "1x600"), ("artist", "600x1"), *(("child", name) for name in PICTURES)],
 )
 def test_any_picture_gives_strokes_that_can_be_drawn(style, name):
     photo = PICTURES[name]
@@ -181,7 +217,9 @@ def test_the_margin_is_left(style):
     style = replace(load_style(style), margin_mm=8.0)
     light = shown(PICTURES["black"], strokes_for(PICTURES["black"], style))
     bare = np.abs(light - PAPER).max(2) < 1e-3
-    rim = np.concatenate([bare[:3].ravel(), bare[-3:].ravel(), bare[:, :3].ravel(), bare[:, -3:].ravel()])
+    rim = np.concatenate(
+        [bare[:3].ravel(), bare[-3:].ravel(), bare[:, :3].ravel(), bare[:, -3:].ravel()]
+    )
     assert rim.mean() > 0.95 and bare[30:-30, 30:-30].mean() < 0.6
 
 
@@ -198,7 +236,9 @@ def test_logo_takes_the_paper_for_what_is_transparent():
     photo = PICTURES["logo"]
     light = shown(photo, strokes_for(photo))
     lab = oklab(light)
-    assert np.allclose(light[2:8, 2:8], PAPER, atol=0.03) and lab[45, 60, 0] > 0.9, "corners and the hole are bare"
+    assert np.allclose(light[2:8, 2:8], PAPER, atol=0.03) and lab[45, 60, 0] > 0.9, (
+        "corners and the hole are bare"
+    )
     assert lab[20, 60, 1] > 0.15, "the ring is red"
 
 
@@ -218,18 +258,28 @@ def test_on_dark_paper_lights_are_drawn_and_darks_left():
     photo = np.tile(paper, (240, 320, 1))
     photo[60:180, 100:220] = 0.9
     for name in ("artist", "child"):
-        light = shown(photo, strokes_for(photo, replace(load_style(name), lift=0.0), table=dark), dark)
+        light = shown(
+            photo, strokes_for(photo, replace(load_style(name), lift=0.0), table=dark), dark
+        )
         assert oklab(light)[30:60, 45:75, 0].mean() > 0.8
         assert np.abs(light[3:15, 3:25] - paper).max() < 0.01
 
 
 def test_a_palette_of_a_hundred_crayons():
     times = -(-100 // len(TABLE.names))
-    shades = np.random.default_rng(2).uniform(0.7, 1, (len(TABLE.names) * times, 1, 3)).astype(np.float32)
+    shades = (
+        np.random.default_rng(2)
+        .uniform(0.7, 1, (len(TABLE.names) * times, 1, 3))
+        .astype(np.float32)
+    )
     many = Swatches(
-        tuple(f"crayon {i}" for i in range(len(shades))), TABLE.pressures, np.tile(TABLE.a, (1, times, 1, 1)),
-        np.tile(TABLE.b, (1, times, 1, 1)) * shades, np.tile(TABLE.grain, (times, 1)), TABLE.paper,
-    )  # fmt: skip
+        tuple(f"crayon {i}" for i in range(len(shades))),
+        TABLE.pressures,
+        np.tile(TABLE.a, (1, times, 1, 1)),
+        np.tile(TABLE.b, (1, times, 1, 1)) * shades,
+        np.tile(TABLE.grain, (times, 1)),
+        TABLE.paper,
+    )
     checked(strokes_for(PICTURES["clouds"], table=many), PICTURES["clouds"])
 
 
@@ -238,7 +288,7 @@ def test_a_single_crayon():
     assert {s.crayon for s in strokes_for(PICTURES["clouds"], table=only)} == {"blue"}
 
 
-# ---- the same and not the same -----------------------------------------------------------------------------
+# ---- the same and not the same -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("style", style_names())
@@ -257,7 +307,9 @@ def test_other_seed_other_strokes_of_the_same_picture():
     one, other = strokes_for(PICTURES["clouds"], seed=0), strokes_for(PICTURES["clouds"], seed=1)
     assert not same(one, other)
     assert 0.6 < len(one) / len(other) < 1.7
-    apart = analysis.far(shown(PICTURES["clouds"], one)) - analysis.far(shown(PICTURES["clouds"], other))
+    apart = analysis.far(shown(PICTURES["clouds"], one)) - analysis.far(
+        shown(PICTURES["clouds"], other)
+    )
     assert np.linalg.norm(apart, axis=2).mean() < 0.08
 
 
@@ -293,7 +345,9 @@ def test_only_a_child_draws_lines_first():
 def test_a_coat_is_pressed_as_hard_as_it_says():
     style = load_style("artist")
     soft, hard = (
-        in_stages(PICTURES["clouds"], replace(style, passes=(replace(style.passes[0], press=press),)))[0]
+        in_stages(
+            PICTURES["clouds"], replace(style, passes=(replace(style.passes[0], press=press),))
+        )[0]
         for press in (1.0, 1.5)
     )
     assert len(soft) > 10
@@ -319,17 +373,25 @@ def test_the_ground_is_hatched_wider_than_the_subject():
     mask[:, : mask.shape[1] // 2] = 1
     covered = []
     for gaps in (0.0, 2.0):
-        strokes = strokes_for(photo, replace(load_style("artist"), open=gaps), who=Subject((), mask))
+        strokes = strokes_for(
+            photo, replace(load_style("artist"), open=gaps), who=Subject((), mask)
+        )
         on_left = [s.path_mm[:, 0].mean() < LONG_MM / 2 for s in strokes]
-        covered.append([
-            sum(travel(s) * s.tip.width_mm for s, left in zip(strokes, on_left, strict=True) if left == side)
-            for side in (True, False)
-        ])  # fmt: skip
+        covered.append(
+            [
+                sum(
+                    travel(s) * s.tip.width_mm
+                    for s, left in zip(strokes, on_left, strict=True)
+                    if left == side
+                )
+                for side in (True, False)
+            ]
+        )
     even, wide = (left / right for left, right in covered)
     assert wide > 1.5 * even
 
 
-# ---- styles are hands of their own -------------------------------------------------------------------------
+# ---- styles are hands of their own ---------------------------------------------------------------
 
 
 def face_like():
@@ -385,19 +447,33 @@ def test_a_sketch_leaves_out_the_ground_and_not_the_sitter(hands):
 
 
 def test_each_style_is_a_hand_of_its_own(hands):
-    """Every two differ clearly in paper left, width of tips, lines' share, crayons, length or force."""
+    """Every two differ clearly in paper left, width of tips, lines' share, crayons, length or
+    force.
+    """
 
     def figures(name):
         strokes, light = hands[name]
         length = np.array([travel(s) for s in strokes])
         line = np.array([s.note == "line" for s in strokes])
         width = np.array([s.tip.width_mm for s in strokes])
-        return np.array([
-            np.log(0.02 + bare_share(light)), np.log((width * length).sum() / length.sum()),
-            np.log(0.02 + length[line].sum() / length.sum()), np.log(len({s.crayon for s in strokes})),
-            np.log(length[~line].mean()),
-            np.log(np.median([s.force_n.mean() / s.tip.width_mm**1.25 for s in strokes if s.note != "line"])),
-        ])  # fmt: skip
+        return np.array(
+            [
+                np.log(0.02 + bare_share(light)),
+                np.log((width * length).sum() / length.sum()),
+                np.log(0.02 + length[line].sum() / length.sum()),
+                np.log(len({s.crayon for s in strokes})),
+                np.log(length[~line].mean()),
+                np.log(
+                    np.median(
+                        [
+                            s.force_n.mean() / s.tip.width_mm**1.25
+                            for s in strokes
+                            if s.note != "line"
+                        ]
+                    )
+                ),
+            ]
+        )
 
     of = {name: figures(name) for name in hands}
     for one in hands:
@@ -412,7 +488,10 @@ def test_a_solid_hand_presses_hardest_and_a_fine_one_is_finest(hands):
 
     width = {name: mean(name, lambda s: s.tip.width_mm) for name in hands}
     assert min(width, key=width.get) == "fine" and max(width, key=width.get) == "child"
-    force = {name: mean(name, lambda s: s.force_n.mean() / s.tip.width_mm**1.25) for name in ("artist", "solid")}
+    force = {
+        name: mean(name, lambda s: s.force_n.mean() / s.tip.width_mm**1.25)
+        for name in ("artist", "solid")
+    }
     assert force["solid"] > 1.15 * force["artist"]
 
 
@@ -420,14 +499,17 @@ def test_a_fine_hand_comes_nearer_to_the_photo_than_a_child(hands):
     target = analysis.far(analysis.fit(face_like(), (90, 120)))
     inner = np.s_[20:70, 30:80]
     fine, child = (
-        np.linalg.norm(analysis.far(hands[name][1]) - target, axis=2)[inner].mean() for name in ("fine", "child")
+        np.linalg.norm(analysis.far(hands[name][1]) - target, axis=2)[inner].mean()
+        for name in ("fine", "child")
     )
     assert fine < 0.7 * child
 
 
 @pytest.mark.parametrize("style", style_names())
 def test_strokes_stay_on_the_sheet(style):
-    """A hand may slip over the border of the sheet, but not further than its overshoot and half a line."""
+    """A hand may slip over the border of the sheet, but not further than its overshoot and half a
+    line.
+    """
     for changes in ({}, {"margin_mm": 0.0}):
         hand = replace(load_style(style), **changes)
         points = np.concatenate([s.path_mm for s in strokes_for(PICTURES["black"], hand)])
@@ -435,7 +517,7 @@ def test_strokes_stay_on_the_sheet(style):
         assert np.percentile(over, 99) < 2.5 and over.max() < 10, "mm"
 
 
-# ---- on real wax -------------------------------------------------------------------------------------------
+# ---- on real wax ---------------------------------------------------------------------------------
 
 
 def drawn(photo, size=120, **changes):
@@ -489,6 +571,9 @@ def test_twice_the_size_is_the_same_picture_from_afar():
         photo = clouds(seed, (240, 320))
         small, large = (drawn(photo, size=size)[1].picture(light=False) for size in (200, 400))
         large = cv2.resize(large, small.shape[1::-1], interpolation=cv2.INTER_AREA)
-        seen = [rgb2lab(np.clip(cv2.GaussianBlur(p, (0, 0), 0.012 * 200), 0, 1) ** (1 / 2.2)) for p in (small, large)]
+        seen = [
+            rgb2lab(np.clip(cv2.GaussianBlur(p, (0, 0), 0.012 * 200), 0, 1) ** (1 / 2.2))
+            for p in (small, large)
+        ]
         apart.append(deltaE_ciede2000(*seen).mean())
     assert np.mean(apart) < 3.9

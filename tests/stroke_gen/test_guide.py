@@ -39,10 +39,14 @@ def test_a_linear_function_of_colour_comes_back(seed):
 
 
 @pytest.mark.parametrize("radius", [3.0, 12.0, 60.0])
-@pytest.mark.parametrize("lab", [picture(), step(), np.zeros((*SHAPE, 3), np.float32)], ids=["picture", "step", "flat"])
+@pytest.mark.parametrize(
+    "lab", [picture(), step(), np.zeros((*SHAPE, 3), np.float32)], ids=["picture", "step", "flat"]
+)
 def test_a_constant_stays_constant(lab, radius):
     guide = Guide(lab, radius)
-    assert np.allclose(guide.spread(np.full(guide.coarse.shape[:2], 2.5, np.float32)), 2.5, atol=2e-3)
+    assert np.allclose(
+        guide.spread(np.full(guide.coarse.shape[:2], 2.5, np.float32)), 2.5, atol=2e-3
+    )
 
 
 def test_values_add_up():
@@ -65,7 +69,11 @@ def test_smooth_where_the_photo_is_smooth():
     guide = Guide(flat, 12.0)
     noise = np.random.default_rng(2).random(guide.coarse.shape[:2]).astype(np.float32)
     assert guide.spread(noise).std() < 0.15 * noise.std()
-    jump = (np.arange(guide.coarse.shape[1])[None] > 20).astype(np.float32).repeat(len(guide.coarse), 0)
+    jump = (
+        (np.arange(guide.coarse.shape[1])[None] > 20)
+        .astype(np.float32)
+        .repeat(len(guide.coarse), 0)
+    )
     assert np.abs(np.diff(guide.spread(jump), axis=1)).max() < 0.1
 
 

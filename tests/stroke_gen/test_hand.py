@@ -1,4 +1,6 @@
-"""The hand: what it adds to ideal lines has the size the style says, and survives the drawing's file."""
+"""The hand: what it adds to ideal lines has the size the style says, and survives the drawing's
+file.
+"""
 
 from dataclasses import replace
 
@@ -17,12 +19,20 @@ AREA = 0.785 * 2.0**2  # of the tip
 
 
 def lines(number=1, points=101, legs=1, pressure=0.3):
-    """Straight level lines of 50 mm, one above the other, in units of 0.5 mm; each leg runs back."""
+    """Straight level lines of 50 mm, one above the other, in units of 0.5 mm; each leg runs
+    back.
+    """
     one = np.stack([np.linspace(0, 100, points), np.zeros(points)], 1)
-    path = np.concatenate([(one if leg % 2 == 0 else one[::-1]) + [0, 3 * leg] for leg in range(legs)])
-    all_ = np.concatenate([path + np.array([20, 20 + 3 * legs * n]) for n in range(number)]).astype(np.float32)
+    path = np.concatenate(
+        [(one if leg % 2 == 0 else one[::-1]) + [0, 3 * leg] for leg in range(legs)]
+    )
+    all_ = np.concatenate([path + np.array([20, 20 + 3 * legs * n]) for n in range(number)]).astype(
+        np.float32
+    )
     leg = np.tile(np.repeat(np.arange(legs), points), number).astype(np.int32)
-    return Paths(all_, np.full(len(all_), pressure, np.float32), leg, np.arange(number + 1) * points * legs)
+    return Paths(
+        all_, np.full(len(all_), pressure, np.float32), leg, np.arange(number + 1) * points * legs
+    )
 
 
 def drawn(paths, style=STEADY, tip=TIP, seed=0):
@@ -114,10 +124,24 @@ def test_force_spreads_from_leg_to_leg():
 
 
 def test_dabs_and_nothing():
-    dab = Paths(np.array([[4, 5]], np.float32), np.full(1, 0.4, np.float32), np.zeros(1, np.int32), np.array([0, 1]))
+    dab = Paths(
+        np.array([[4, 5]], np.float32),
+        np.full(1, 0.4, np.float32),
+        np.zeros(1, np.int32),
+        np.array([0, 1]),
+    )
     (stroke,) = drawn(dab, load_style("child"))
-    assert stroke.path_mm.shape == (1, 2) and np.isfinite(stroke.force_n).all() and stroke.force_n[0] > 0
-    nothing = Paths(np.empty((0, 2), np.float32), np.empty(0, np.float32), np.empty(0, np.int32), np.zeros(1, np.int64))
+    assert (
+        stroke.path_mm.shape == (1, 2)
+        and np.isfinite(stroke.force_n).all()
+        and stroke.force_n[0] > 0
+    )
+    nothing = Paths(
+        np.empty((0, 2), np.float32),
+        np.empty(0, np.float32),
+        np.empty(0, np.int32),
+        np.zeros(1, np.int64),
+    )
     assert drawn(nothing) == []
 
 
@@ -162,5 +186,8 @@ def test_saving_and_loading_changes_nothing(tmp_path):
 def test_same_seed_same_hand():
     style = load_style("child")
     one, two, other = (drawn(lines(5), style, seed=seed) for seed in (3, 3, 4))
-    assert all((a.path_mm == b.path_mm).all() and (a.force_n == b.force_n).all() for a, b in zip(one, two, strict=True))
+    assert all(
+        (a.path_mm == b.path_mm).all() and (a.force_n == b.force_n).all()
+        for a, b in zip(one, two, strict=True)
+    )
     assert all((a.path_mm != b.path_mm).any() for a, b in zip(one, other, strict=True))

@@ -1,4 +1,6 @@
-"""Hatching: legs keep to the field, to their distance and to the ground that wants them, on any field."""
+"""Hatching: legs keep to the field, to their distance and to the ground that wants them, on any
+field.
+"""
 
 import numpy as np
 import pytest
@@ -44,7 +46,13 @@ FIELDS, HOSTILE = fields(), hostile()
 
 
 def how(spacing=3.0, **changes):
-    values = {"spacing": spacing, "shortest": 3 * spacing, "reach": 20 * spacing, "legs": 10, "gap": 0.5 * spacing}
+    values = {
+        "spacing": spacing,
+        "shortest": 3 * spacing,
+        "reach": 20 * spacing,
+        "legs": 10,
+        "gap": 0.5 * spacing,
+    }
     return Hatch(**{**values, "single": 0.5, **changes})
 
 
@@ -102,14 +110,19 @@ def test_legs_follow_a_curved_field(name):
 @pytest.mark.parametrize("degrees", range(0, 180, 15))
 @pytest.mark.parametrize("spacing", [2.0, 4.0])
 def test_as_much_line_as_the_spacing_asks_for_at_every_angle(spacing, degrees):
-    """The table of crayons was measured with lines one spacing apart; more of them would be darker."""
+    """The table of crayons was measured with lines one spacing apart; more of them would be
+    darker.
+    """
     length = segments(drawn(full(), constant(degrees), how(spacing)))[2].sum()
     assert length * spacing / SIZE**2 == pytest.approx(1, abs=0.12)
 
 
 @pytest.mark.parametrize("degrees", [0, -50])
 def test_wider_gaps_mean_as_much_less_line(degrees):
-    length = [segments(drawn(full(), constant(degrees), how(), gaps=gaps))[2].sum() for gaps in (1.0, 1.5, 2.5)]
+    length = [
+        segments(drawn(full(), constant(degrees), how(), gaps=gaps))[2].sum()
+        for gaps in (1.0, 1.5, 2.5)
+    ]
     for gaps, some in zip((1.5, 2.5), length[1:], strict=True):
         assert some * gaps / length[0] == pytest.approx(1, abs=0.15)
 
@@ -124,7 +137,10 @@ def test_gaps_are_wide_where_they_are_wide():
     assert left / right == pytest.approx(2.5, rel=0.2)
     leg = leg_of(paths)
     open_ = paths.points[:, 0] > 90
-    apart_ = [apart(paths.points[open_ & (leg == n)], paths.points[leg != n]).min() for n in np.unique(leg[open_])]
+    apart_ = [
+        apart(paths.points[open_ & (leg == n)], paths.points[leg != n]).min()
+        for n in np.unique(leg[open_])
+    ]
     assert min(apart_) > 0.35 * 2.5 * 3.0
 
 
@@ -143,19 +159,30 @@ def test_as_much_line_on_curved_fields(name):
     assert length * 3 / SIZE**2 == pytest.approx(1, abs=0.2)
 
 
-@pytest.mark.parametrize("field", [constant(0), constant(-50), *FIELDS.values()], ids=["0", "-50", *FIELDS])
+@pytest.mark.parametrize(
+    "field", [constant(0), constant(-50), *FIELDS.values()], ids=["0", "-50", *FIELDS]
+)
 def test_legs_keep_their_distance(field):
-    """No leg comes much nearer than half the spacing to another, and the usual distance is the spacing."""
+    """No leg comes much nearer than half the spacing to another, and the usual distance is the
+    spacing.
+    """
     spacing = 4.0
     paths = drawn(full(), field, how(spacing))
     leg = leg_of(paths)
-    nearest = np.concatenate([apart(paths.points[leg == n], paths.points[leg != n]) for n in np.unique(leg)]) / spacing
+    nearest = (
+        np.concatenate(
+            [apart(paths.points[leg == n], paths.points[leg != n]) for n in np.unique(leg)]
+        )
+        / spacing
+    )
     assert nearest.min() > 0.35
     assert np.percentile(nearest, 5) > 0.45
     assert np.median(nearest) > 0.7
 
 
-@pytest.mark.parametrize("field", [constant(0), constant(-50), *FIELDS.values()], ids=["0", "-50", *FIELDS])
+@pytest.mark.parametrize(
+    "field", [constant(0), constant(-50), *FIELDS.values()], ids=["0", "-50", *FIELDS]
+)
 @pytest.mark.parametrize("spacing", [1.0, 2.5, 6.0])
 def test_wanted_ground_is_covered(spacing, field):
     want = full()
@@ -218,7 +245,9 @@ def test_tiny_sheets(shape):
     assert drawn(full(0, shape), field, how()).points.size == 0
 
 
-@pytest.mark.parametrize("place", [(0, 0), (0, SIZE - 1), (SIZE - 1, 0), (SIZE - 1, SIZE - 1), (80, 80)])
+@pytest.mark.parametrize(
+    "place", [(0, 0), (0, SIZE - 1), (SIZE - 1, 0), (SIZE - 1, SIZE - 1), (80, 80)]
+)
 def test_single_cells_do_no_harm(place):
     want = full(0)
     want[place] = 0.5
@@ -239,7 +268,10 @@ def test_zigzags_go_to_and_fro_beside_each_other():
     assert paths.leg.max() <= 7 and np.bincount(np.unique(leg) // 1000).max() > 4
     turn = np.flatnonzero((np.diff(leg) != 0) & (np.diff(stroke) == 0))
     assert np.linalg.norm(paths.points[turn + 1] - paths.points[turn], axis=1).max() < 4 * 5
-    forward = [np.sign((paths.points[leg == n][-1] - paths.points[leg == n][0]) @ along) for n in np.unique(leg)]
+    forward = [
+        np.sign((paths.points[leg == n][-1] - paths.points[leg == n][0]) @ along)
+        for n in np.unique(leg)
+    ]
     same = np.diff(np.unique(leg) // 1000) == 0
     assert (np.diff(forward)[same] != 0).all()
 
@@ -262,7 +294,9 @@ def test_legs_have_the_length_of_a_hand():
 def test_large_areas_are_hatched_to_the_end():
     """The buffers suffice: the last rows are as full as the first."""
     shape = (640, 640)
-    paths = drawn(full(shape=shape), np.tile(np.array([0.6, -0.8], np.float32), (*shape, 1)), how(0.8))
+    paths = drawn(
+        full(shape=shape), np.tile(np.array([0.6, -0.8], np.float32), (*shape, 1)), how(0.8)
+    )
     rows = np.histogram(paths.points[:, 1], 8, (0, 640))[0]
     assert rows.min() > 0.9 * rows.max()
 

@@ -1,4 +1,6 @@
-"""What is left out: the sheet's border and, in a sketch, the far ground; ragged, and never the subject."""
+"""What is left out: the sheet's border and, in a sketch, the far ground; ragged, and never the
+subject.
+"""
 
 import numpy as np
 import pytest
@@ -24,7 +26,7 @@ def from_border(shape=SHAPE):
     return np.minimum(np.minimum(x, y), np.minimum(shape[1] - 1 - x, shape[0] - 1 - y))
 
 
-# ---- margin ------------------------------------------------------------------------------------------------
+# ---- margin --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -52,11 +54,14 @@ def test_no_margin_leaves_the_whole_sheet():
 
 @pytest.mark.parametrize("shape", [(2, 2), (2, 640), (640, 2)])
 def test_on_a_thread_of_a_sheet(shape):
-    for found in (margin.inside(shape, 0.4, TIP, rng()), margin.faded(disc(1, shape), 0.4, TIP, -50, rng())):
+    for found in (
+        margin.inside(shape, 0.4, TIP, rng()),
+        margin.faded(disc(1, shape), 0.4, TIP, -50, rng()),
+    ):
         assert found.shape == shape and np.isfinite(found).all()
 
 
-# ---- fading ------------------------------------------------------------------------------------------------
+# ---- fading --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("fade", [0.1, 0.3, 0.5, 0.7])

@@ -1,4 +1,6 @@
-"""Mixing: which crayons a surface gets, from a box whose colours are known, and the kernels against slow twins."""
+"""Mixing: which crayons a surface gets, from a box whose colours are known, and the kernels against
+slow twins.
+"""
 
 from dataclasses import replace
 from itertools import combinations, product
@@ -21,7 +23,12 @@ SIZE = 30  # cells along the side of a patch
 
 def with_greys():
     """The box with a grey and skin crayons beside the nine."""
-    return {**COLOURS, "grey": (0.25, 0.25, 0.25), "peach": (0.8, 0.5, 0.36), "tan": (0.45, 0.24, 0.13)}
+    return {
+        **COLOURS,
+        "grey": (0.25, 0.25, 0.25),
+        "peach": (0.8, 0.5, 0.36),
+        "tan": (0.45, 0.24, 0.13),
+    }
 
 
 def table_of(*names, colours=None):
@@ -52,11 +59,13 @@ def found(*colours, table=TABLE, most=9, seed=0, **body):
     return [[table.names[k] for k in row if k >= 0] for row in layers]
 
 
-# ---- slow twins --------------------------------------------------------------------------------------------
+# ---- slow twins ----------------------------------------------------------------------------------
 
 
 def slow_combine(ground, crayons, choice, table):
-    """OKLab and price of grain of crayons laid one over the other, `choice` their pressures, 0 for none."""
+    """OKLab and price of grain of crayons laid one over the other, `choice` their pressures, 0 for
+    none.
+    """
     light, dots = np.asarray(ground, float), 0.0
     for k, p in zip(crayons, choice, strict=True):
         if p == 0:
@@ -86,7 +95,8 @@ def test_combine_is_its_slow_twin(names, ground):
 def slow_cost(sample, crayons, table, extra=0.0):
     """Mean over colours (3, n) of the least distance and price over all choices of pressures."""
     every = [slow_combine(table.paper, crayons, choice, table)
-             for choice in product(range(len(table.pressures) + 1), repeat=len(crayons))]  # fmt: skip
+             for choice in product(range(len(table.pressures) + 1), repeat=len(crayons))
+    ]  # fmt: skip
     off = [np.linalg.norm(sample - lab[:, None], axis=0) + price for lab, price in every]
     return float(np.min(off, 0).mean()) + extra
 
@@ -99,7 +109,15 @@ def test_try_is_its_slow_twin():
     allowed = np.ones(len(NAMES), np.bool_)
     allowed[5] = False
     cost = np.empty((3, 5), np.float32)
-    mixing._try(sample, np.broadcast_to(pairs, (3, 5, 2)).copy(), extra, allowed, FULL, mixing.wax(TABLE), cost)
+    mixing._try(
+        sample,
+        np.broadcast_to(pairs, (3, 5, 2)).copy(),
+        extra,
+        allowed,
+        FULL,
+        mixing.wax(TABLE),
+        cost,
+    )
     for g in range(3):
         for q in range(3):
             slow = slow_cost(sample[g], pairs[q], TABLE, extra[g, pairs[q]].sum())
@@ -107,16 +125,19 @@ def test_try_is_its_slow_twin():
     assert (cost[:, 3:] > 8).all(), "neither crayons left in the box nor half a mixture"
 
 
-# ---- what is chosen ----------------------------------------------------------------------------------------
+# ---- what is chosen ------------------------------------------------------------------------------
 
 
 def prices_of(scene, table, seed=0):
-    """Samples, and prices of crayons, as `find` takes them for patches that are neither skin nor hair."""
+    """Samples, and prices of crayons, as `find` takes them for patches that are neither skin nor
+    hair.
+    """
     sample, _ = mixing._samples(scene.guide.lab, scene.family, np.random.default_rng(seed))
     return sample, mixing.prices(sample, table) + mixing.LAYER_PRICE
 
 
-@pytest.mark.parametrize("names, pressures", [(("yellow", "blue"), (4, 2)), (("white", "red"), (3, 2)),
+@pytest.mark.parametrize("names, pressures", [(("yellow", "blue"), (4, 2)),
+                                              (("white", "red"), (3, 2)),
                                               (("sky", "green"), (3, 3))])  # fmt: skip
 def test_no_single_crayon_and_no_pair_is_cheaper_than_what_is_found(names, pressures):
     """For a colour that is exactly a mixture's, by brute force over a box of six."""
@@ -172,7 +193,9 @@ def test_no_more_crayons_than_asked_for(most):
 def test_of_few_crayons_the_least_missed_are_left():
     """A large red, a large blue and a speck of green: with two crayons the green goes."""
     red, blue, green = (swatch(n, 4) for n in ("red", "blue", "green"))
-    used = find(scene_of(red, red, red, blue, blue, green), TABLE, 2, np.random.default_rng(0)).crayons()
+    used = find(
+        scene_of(red, red, red, blue, blue, green), TABLE, 2, np.random.default_rng(0)
+    ).crayons()
     assert {NAMES[k] for k in used} == {"red", "blue"}
 
 
@@ -196,7 +219,9 @@ def test_grain_is_avoided():
 
 def test_same_seed_same_mixtures():
     colours = np.random.default_rng(2).random((12, 3))
-    one, two = (find(scene_of(*colours), TABLE, 6, np.random.default_rng(3)).layers for _ in range(2))
+    one, two = (
+        find(scene_of(*colours), TABLE, 6, np.random.default_rng(3)).layers for _ in range(2)
+    )
     assert (one == two).all()
 
 
@@ -206,7 +231,7 @@ def test_the_order_of_the_box_does_not_matter():
     assert found(*colours) == found(*colours, table=other)
 
 
-# ---- prices ------------------------------------------------------------------------------------------------
+# ---- prices --------------------------------------------------------------------------------------
 
 
 def taken(monkeypatch, name, value, colour, table):
@@ -244,8 +269,11 @@ def test_a_loud_crayon_in_a_quiet_surface_has_its_price(monkeypatch):
 def test_black_in_the_light_has_its_price(monkeypatch):
     table = table_of("black")
     table = replace(table, grain=0 * table.grain)
-    sample, _ = mixing._samples(oklab(np.full((9, 9, 3), 0.8, np.float32)), np.zeros((9, 9), np.int32),
-                                np.random.default_rng(0))  # fmt: skip
+    sample, _ = mixing._samples(
+        oklab(np.full((9, 9, 3), 0.8, np.float32)),
+        np.zeros((9, 9), np.int32),
+        np.random.default_rng(0),
+    )
     assert mixing.prices(sample, table)[0, 0] > 0
     dark = np.zeros_like(sample)
     assert mixing.prices(dark, table)[0, 0] == pytest.approx(0, abs=1e-6)
@@ -253,7 +281,9 @@ def test_black_in_the_light_has_its_price(monkeypatch):
 
 def test_skin_takes_no_foreign_crayon_where_the_box_has_its_own():
     """Green under red comes nearer to this tan than anything else but costs what is foreign."""
-    table = table_of("white", "peach", "tan", "brown", "pink", "red", "green", "blue", "grey", "black")
+    table = table_of(
+        "white", "peach", "tan", "brown", "pink", "red", "green", "blue", "grey", "black"
+    )
     rng = np.random.default_rng(4)
     shades = [swatch("tan", p, table, swatch("peach", q, table)) + rng.uniform(-0.04, 0.04, 3)
               for p, q in product((0, 2, 4), (1, 4))]  # fmt: skip
@@ -275,7 +305,9 @@ def test_what_is_foreign_to_skin():
     table = table_of()
     strange = dict(zip(table.names, foreign(table, mixing.SKIN_RAD), strict=True))
     assert all(strange[name] > 0.8 for name in ("green", "blue", "sky", "grey", "black")), strange
-    assert all(strange[name] < 0.2 for name in ("peach", "tan", "white")) and strange["brown"] < 0.5, strange
+    assert (
+        all(strange[name] < 0.2 for name in ("peach", "tan", "white")) and strange["brown"] < 0.5
+    ), strange
     assert (foreign(table, mixing.HAIR_RAD) <= foreign(table, mixing.SKIN_RAD) + 1e-6).all()
 
 
@@ -295,12 +327,12 @@ def test_near_hues_do_not_clash_and_the_farther_apart_others_are_the_more_they_d
 
 
 def test_black_is_no_grey():
-    assert greyness(oklab(np.array([[0.25] * 3, COLOURS["black"], COLOURS["red"]], np.float32))) == pytest.approx(
-        [1, 0, 0], abs=0.02
-    )
+    assert greyness(
+        oklab(np.array([[0.25] * 3, COLOURS["black"], COLOURS["red"]], np.float32))
+    ) == pytest.approx([1, 0, 0], abs=0.02)
 
 
-# ---- the box -----------------------------------------------------------------------------------------------
+# ---- the box -------------------------------------------------------------------------------------
 
 
 def test_box_of_only_the_crayons_in_use():
@@ -316,7 +348,13 @@ def test_a_single_crayon_and_a_box_of_a_hundred():
         tuple(map(str, range(99))), TABLE.pressures, np.tile(TABLE.a, (1, 11, 1, 1)),
         np.tile(TABLE.b, (1, 11, 1, 1)) * shades, np.tile(TABLE.grain, (11, 1)), TABLE.paper,
     )  # fmt: skip
-    assert 1 <= len({k for row in found((0.5, 0.2, 0.1), (0.1, 0.4, 0.3), table=many, most=3) for k in row}) <= 3
+    assert (
+        1
+        <= len(
+            {k for row in found((0.5, 0.2, 0.1), (0.1, 0.4, 0.3), table=many, most=3) for k in row}
+        )
+        <= 3
+    )
 
 
 def test_samples_are_of_each_surface_and_sizes_its_shares():

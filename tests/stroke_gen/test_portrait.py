@@ -142,7 +142,8 @@ def test_marks_stay_on_the_paper_that_may_be_drawn_on():
 
 def test_lines_on_skin_take_skins_crayons_and_irises_any():
     names = {"peach": (0.8, 0.5, 0.35), "brown": (0.2, 0.08, 0.03), "red": (0.6, 0.03, 0.03),
-             "blue": (0.05, 0.15, 0.5), "green": (0.05, 0.3, 0.1), "black": (0.02, 0.02, 0.02)}  # fmt: skip
+             "blue": (0.05, 0.15, 0.5), "green": (0.05, 0.3, 0.1),
+             "black": (0.02, 0.02, 0.02)}  # fmt: skip
     heavy = np.array(list(names.values()), np.float32)[:, None]
     table = oklab(1 - (1 - heavy) * np.float32([0.5, 0.9, 1])[:, None])  # (k, p, 3), on white paper
 

@@ -22,7 +22,9 @@ def seen_of(photo, mask=None, style=None, focus=(), long_mm=72.0):
     width, height = photo.shape[1] * scale, photo.shape[0] * scale
     mask = np.zeros(analysis.work_shape(width, height), np.float32) if mask is None else mask
     with ThreadPoolExecutor(2) as pool:
-        return scene.read(photo, Subject((), mask), width, height, box(), style or Style(), focus, pool)
+        return scene.read(
+            photo, Subject((), mask), width, height, box(), style or Style(), focus, pool
+        )
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 50), (50, 1), (2, 2), (5, 400), (90, 120)])
@@ -30,9 +32,21 @@ def test_a_photo_of_any_shape_gives_finite_maps_of_the_grid(shape):
     seen = seen_of(np.random.default_rng(5).random((*shape, 3)).astype(np.float32))
     grid = seen.target.shape[:2]
     assert max(grid) == 155
-    for name in ("target", "lab", "natural", "tangent", "coherence", "skin", "hair", "care", "detail"):
+    for name in (
+        "target",
+        "lab",
+        "natural",
+        "tangent",
+        "coherence",
+        "skin",
+        "hair",
+        "care",
+        "detail",
+    ):
         values = getattr(seen, name)
-        assert values.dtype == np.float32 and np.isfinite(values).all() and values.shape[:2] == grid, name
+        assert (
+            values.dtype == np.float32 and np.isfinite(values).all() and values.shape[:2] == grid
+        ), name
     for name in ("coherence", "skin", "hair", "care", "detail"):
         assert getattr(seen, name).min() >= -1e-6 and getattr(seen, name).max() <= 1 + 1e-3, name
     assert seen.guide.lab.shape == seen.lab.shape
@@ -45,7 +59,9 @@ def test_target_and_lab_are_the_same_colours():
 
 
 def test_a_family_is_made_of_whole_surfaces():
-    seen = seen_of(np.random.default_rng(7).random((6, 8, 3)).astype(np.float32).repeat(20, 0).repeat(20, 1))
+    seen = seen_of(
+        np.random.default_rng(7).random((6, 8, 3)).astype(np.float32).repeat(20, 0).repeat(20, 1)
+    )
     assert seen.label.max() > 3
     for surface in range(seen.label.max() + 1):
         assert len(np.unique(seen.family[seen.label == surface])) == 1

@@ -1,4 +1,6 @@
-"""Plates: how hard each crayon is pressed where, the kernel against its slow twin, and what must never be wanted."""
+"""Plates: how hard each crayon is pressed where, the kernel against its slow twin, and what must
+never be wanted.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
@@ -21,7 +23,9 @@ RED, GREEN = (0.5, 0.03, 0.03), (0.03, 0.3, 0.06)
 
 
 def plan_for(photo, family=None, table=TABLE, threads=2, layers=None):
-    """A plan for a photo that is its own work grid; layers: names of crayons of each family instead of the best."""
+    """A plan for a photo that is its own work grid; layers: names of crayons of each family instead
+    of the best.
+    """
     scene = scene_of(photo, family)
     if layers is None:
         return plan_of(scene, POOLS[threads], table)
@@ -31,7 +35,9 @@ def plan_for(photo, family=None, table=TABLE, threads=2, layers=None):
 
 def wanted(plan, now=None, turn=0, dark_price=0.3):
     paper = np.tile(plan.swatches.paper, (*plan.scene.label.shape, 1)) if now is None else now
-    return {plan.swatches.names[k]: want for k, want in plates(plan, paper, turn, dark_price).items()}
+    return {
+        plan.swatches.names[k]: want for k, want in plates(plan, paper, turn, dark_price).items()
+    }
 
 
 def laid(plan, dark_price=0.3):
@@ -53,7 +59,7 @@ def ramp(low=0.02, high=0.9, shape=(60, 240)):
     return np.repeat(grey[None, :, None], 3, 2).repeat(shape[0], 0)
 
 
-# ---- what is wanted ----------------------------------------------------------------------------------------
+# ---- what is wanted ------------------------------------------------------------------------------
 
 
 def test_pressure_follows_tone_without_steps():
@@ -84,7 +90,9 @@ def test_nothing_but_white_is_wanted_of_bare_paper(turn):
 def test_nothing_is_wanted_where_the_sheet_is_right():
     red = TABLE.over(TABLE.paper)[NAMES.index("red"), 4]
     photo = np.tile(red, (42, 42, 1))
-    assert wanted(plan_for(photo), turn=None) and wanted(plan_for(photo), now=photo, turn=None) == {}
+    assert (
+        wanted(plan_for(photo), turn=None) and wanted(plan_for(photo), now=photo, turn=None) == {}
+    )
 
 
 def test_a_sheet_that_is_too_light_is_pressed_once_more_and_one_that_is_too_dark_is_not():
@@ -111,7 +119,9 @@ def test_dark_things_are_wanted_dark(turn):
 
 def test_a_turn_lays_one_crayon_of_each_family_in_the_order_of_its_mixture():
     photo = halves(GREEN, (0.12, 0.03, 0.05))
-    plan = plan_for(photo, two_families(photo), layers=[("yellow", "blue"), ("pink", "brown", "black")])
+    plan = plan_for(
+        photo, two_families(photo), layers=[("yellow", "blue"), ("pink", "brown", "black")]
+    )
     now = np.tile(PAPER, (60, 102, 1))
     for turn, allowed in enumerate([{"yellow", "pink"}, {"blue", "brown"}, {"black"}, set()]):
         assert set(wanted(plan, now, turn)) <= allowed
@@ -121,23 +131,32 @@ def test_a_turn_lays_one_crayon_of_each_family_in_the_order_of_its_mixture():
 
 def test_a_layer_leaves_room_for_what_comes_after_it():
     """Under blue, yellow is wanted otherwise than alone."""
-    photo = np.tile(TABLE.over(TABLE.over(PAPER)[NAMES.index("yellow"), 4])[NAMES.index("blue"), 2], (42, 42, 1))
-    alone, under = (wanted(plan_for(photo, layers=[row]))["yellow"].mean() for row in (("yellow",), ("yellow", "blue")))
+    photo = np.tile(
+        TABLE.over(TABLE.over(PAPER)[NAMES.index("yellow"), 4])[NAMES.index("blue"), 2], (42, 42, 1)
+    )
+    alone, under = (
+        wanted(plan_for(photo, layers=[row]))["yellow"].mean()
+        for row in (("yellow",), ("yellow", "blue"))
+    )
     assert abs(np.log(alone / under)) > 0.1
     plan = plan_for(photo, layers=[("yellow", "blue")])
     done, bare = (
-        np.linalg.norm(oklab(now) - oklab(photo), axis=2).mean() for now in (laid(plan), np.tile(PAPER, (42, 42, 1)))
+        np.linalg.norm(oklab(now) - oklab(photo), axis=2).mean()
+        for now in (laid(plan), np.tile(PAPER, (42, 42, 1)))
     )
     assert done < 0.15 * bare, "and so both together come near"
 
 
-# ---- plates are smooth and crisp as the photo is -------------------------------------------------------------
+# ---- plates are smooth and crisp as the photo is -------------------------------------------------
 
 
 def test_plates_are_crisp_at_a_step():
     photo = halves((0.7, 0.7, 0.7), (0.05, 0.05, 0.05))
     row = wanted(plan_for(photo, table=TABLE.only([NAMES.index("black")])))["black"][30]
-    assert np.log(row[:49] / row[:30].mean()).std() < 0.1 and np.log(row[53:] / row[70:].mean()).std() < 0.1
+    assert (
+        np.log(row[:49] / row[:30].mean()).std() < 0.1
+        and np.log(row[53:] / row[70:].mean()).std() < 0.1
+    )
     assert row[53:].min() > 4 * row[:49].max()
 
 
@@ -157,16 +176,20 @@ def test_a_border_between_families_of_like_colour_does_not_show():
     assert np.ptp(np.log(row)) < 0.02
 
 
-# ---- kernel, threads, pressure -------------------------------------------------------------------------------
+# ---- kernel, threads, pressure -------------------------------------------------------------------
 
 
 def slow_soften(aim, ground, crayons, levels, table, dark_price):
-    """The mean level of each crayon over all choices, each weighted by how little worse it is than the best,
-    and less where the best choice without that crayon is hardly worse."""
+    """The mean level of each crayon over all choices, each weighted by how little worse it is than
+    the best, and less where the best choice without that crayon is hardly worse."""
     choices = np.array(list(product(levels, repeat=len(crayons))))
     colour, price = np.empty((len(choices), 3), np.float32), np.empty(len(choices), np.float32)
     mixing.combine(ground, crayons, levels, mixing.wax(table), colour, price)
-    cost = np.linalg.norm(colour - aim, axis=1) + price + dark_price * np.maximum(0, aim[0] - colour[:, 0])
+    cost = (
+        np.linalg.norm(colour - aim, axis=1)
+        + price
+        + dark_price * np.maximum(0, aim[0] - colour[:, 0])
+    )
     weight = np.exp(-(cost - cost.min()) * separation.SHARP)
     without = np.array([cost[choices[:, n] == 0].min() for n in range(len(crayons))])
     worth = np.minimum((without - cost.min()) / separation.WORTH, 1)
@@ -181,8 +204,18 @@ def test_soften_is_its_slow_twin(crayons, same):
     ground = np.tile(PAPER, (20, 1)) if same else rng.random((20, 3)).astype(np.float32)
     cells, crayons = rng.permutation(20)[:9], np.array(crayons)
     level = np.empty((len(crayons), 9), np.float32)
-    separation._soften(cells, aim, ground, same, crayons, levels, mixing.wax(TABLE), np.float32(0.4), separation.SHARP,
-                       level)  # fmt: skip
+    separation._soften(
+        cells,
+        aim,
+        ground,
+        same,
+        crayons,
+        levels,
+        mixing.wax(TABLE),
+        np.float32(0.4),
+        separation.SHARP,
+        level,
+    )
     for i, at in enumerate(cells):
         slow = slow_soften(aim[at], ground[at], crayons, levels, TABLE, 0.4)
         assert np.abs(level[:, i] - slow).max() < 5e-3
@@ -190,16 +223,24 @@ def test_soften_is_its_slow_twin(crayons, same):
 
 @pytest.mark.parametrize("turn", [0, 1, None])
 def test_plates_are_the_same_with_any_number_of_threads(turn):
-    photo = cv2.GaussianBlur(np.random.default_rng(2).random((129, 81, 3)).astype(np.float32), (0, 0), 3)
+    photo = cv2.GaussianBlur(
+        np.random.default_rng(2).random((129, 81, 3)).astype(np.float32), (0, 0), 3
+    )
     family = np.random.default_rng(3).integers(0, 5, (43, 27)).repeat(3, 0).repeat(3, 1)
     first, *others = (wanted(plan_for(photo, family, threads=n), turn=turn) for n in POOLS)
     for other in others:
-        assert first and first.keys() == other.keys() and all((first[k] == other[k]).all() for k in first)
+        assert (
+            first
+            and first.keys() == other.keys()
+            and all((first[k] == other[k]).all() for k in first)
+        )
 
 
 @pytest.mark.parametrize("turn", [0, 1, 2, 3, None])
 def test_pressures_are_those_of_the_table_or_none(turn):
-    photo = np.clip(cv2.GaussianBlur(np.random.default_rng(3).random((81, 99, 3)), (0, 0), 3) * 3 - 1, 0, 1)
+    photo = np.clip(
+        cv2.GaussianBlur(np.random.default_rng(3).random((81, 99, 3)), (0, 0), 3) * 3 - 1, 0, 1
+    )
     for want in wanted(plan_for(photo), turn=turn).values():
         drawn = want[want > 0]
         assert want.dtype == np.float32 and want.shape == (81, 99) and drawn.size

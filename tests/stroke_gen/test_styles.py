@@ -12,7 +12,16 @@ from typing import get_type_hints
 import pytest
 
 from stroke_gen import params
-from stroke_gen.params import FORCES, Pass, Style, load_style, style_from, style_names, with_age, with_force
+from stroke_gen.params import (
+    FORCES,
+    Pass,
+    Style,
+    load_style,
+    style_from,
+    style_names,
+    with_age,
+    with_force,
+)
 
 KINDS = (Style, Pass)
 KEYS = [(kind, f) for kind in KINDS for f in fields(kind) if f.name != "passes"]
@@ -41,7 +50,7 @@ def complaint(tmp_path, text):
     return line
 
 
-# ---- what is shipped ---------------------------------------------------------------------------------------
+# ---- what is shipped -----------------------------------------------------------------------------
 
 
 def test_the_five_styles_are_shipped():
@@ -52,7 +61,9 @@ def test_the_five_styles_are_shipped():
 def test_shipped_style_is_whole(name):
     style = load_style(name)
     assert style.title == style_names()[name] and style.passes
-    assert len({coat.name for coat in style.passes}) == len(style.passes), "coats are told apart by name"
+    assert len({coat.name for coat in style.passes}) == len(style.passes), (
+        "coats are told apart by name"
+    )
     assert style.passes[0].kind == "fill"
     for part in (style, *style.passes):
         for f in fields(part):
@@ -66,7 +77,9 @@ def test_every_number_has_a_range_that_holds_its_default(kind, field):
         return
     low, high = limits(kind, field.name)
     assert low < high and low <= field.default <= high
-    assert isinstance(field.default, int) == isinstance(low, int) or isinstance(field.default, float)
+    assert isinstance(field.default, int) == isinstance(low, int) or isinstance(
+        field.default, float
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -74,23 +87,35 @@ def test_every_key_says_what_it_does(kind):
     """A comment stands behind each key, but for those whose name says all."""
     text = inspect.getsource(kind)
     lines = text.splitlines()
-    commented = {t.start[0] for t in tokenize.generate_tokens(io.StringIO(text).readline) if t.type == tokenize.COMMENT}
+    commented = {
+        t.start[0]
+        for t in tokenize.generate_tokens(io.StringIO(text).readline)
+        if t.type == tokenize.COMMENT
+    }
     for f in fields(kind):
         if f.name not in ("title", "name", "passes"):
-            number = next(i for i, line in enumerate(lines, 1) if line.strip().startswith(f"{f.name}:"))
+            number = next(
+                i for i, line in enumerate(lines, 1) if line.strip().startswith(f"{f.name}:")
+            )
             assert number in commented, f.name
 
 
 def test_every_key_is_read_by_the_generator():
     """A key that nothing reads promises what no drawing shows."""
-    sources = [p.read_text("utf-8") for p in Path(params.__file__).parent.glob("*.py") if p.name != "params.py"]
+    sources = [
+        p.read_text("utf-8")
+        for p in Path(params.__file__).parent.glob("*.py")
+        if p.name != "params.py"
+    ]
     for kind in KINDS:
         for f in fields(kind):
             if f.name not in ("title", "passes"):
-                assert any(re.search(rf"\b(style|coat|hold)\.{f.name}\b", text) for text in sources), f.name
+                assert any(
+                    re.search(rf"\b(style|coat|hold)\.{f.name}\b", text) for text in sources
+                ), f.name
 
 
-# ---- a user's own ------------------------------------------------------------------------------------------
+# ---- a user's own --------------------------------------------------------------------------------
 
 
 def test_a_users_style(tmp_path):
@@ -142,7 +167,8 @@ def test_a_file_that_is_no_text(tmp_path):
 
 
 @pytest.mark.parametrize("name, hint", [
-    ("artits", "'artist'"), ("Child", "'child'"), ("oil", "artist"), ("", "artist"), ("none.toml", "none.toml"),
+    ("artits", "'artist'"), ("Child", "'child'"), ("oil", "artist"), ("", "artist"),
+    ("none.toml", "none.toml"),
     ("../artist", "artist"), (".", "artist"),
 ])  # fmt: skip
 def test_unknown_styles(name, hint):
@@ -156,7 +182,7 @@ def test_reading_a_style_leaves_its_table_alone():
     assert style_from(table, "here") == style_from(table, "here")
 
 
-# ---- force and age -----------------------------------------------------------------------------------------
+# ---- force and age -------------------------------------------------------------------------------
 
 
 def test_forces():

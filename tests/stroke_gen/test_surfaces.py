@@ -1,4 +1,6 @@
-"""Surfaces: what is one thing is one surface, what is alike is one family, and where strokes run."""
+"""Surfaces: what is one thing is one surface, what is alike is one family, and where strokes
+run.
+"""
 
 import cv2
 import numpy as np
@@ -16,7 +18,9 @@ NONE = np.zeros(SHAPE, np.float32)
 
 def flat(*colours, shape=SHAPE):
     """Upright bands of linear colours, in OKLab."""
-    bands = [np.tile(np.array(c, np.float32), (shape[0], shape[1] // len(colours), 1)) for c in colours]
+    bands = [
+        np.tile(np.array(c, np.float32), (shape[0], shape[1] // len(colours), 1)) for c in colours
+    ]
     return oklab(np.concatenate(bands, 1))
 
 
@@ -25,13 +29,15 @@ def parted(lab, care=NONE, subject=NONE, least=LEAST):
 
 
 def agree(one, other):
-    """Share of the sheet on which two partings are the same up to names, by the best match of each."""
+    """Share of the sheet on which two partings are the same up to names, by the best match of
+    each.
+    """
     counts = np.zeros((one.max() + 1, other.max() + 1))
     np.add.at(counts, (one.ravel(), other.ravel()), 1)
     return min(counts.max(0).sum(), counts.max(1).sum()) / one.size
 
 
-# ---- surfaces ----------------------------------------------------------------------------------------------
+# ---- surfaces ------------------------------------------------------------------------------------
 
 
 def test_a_soft_gradient_does_not_part_a_surface():
@@ -53,14 +59,20 @@ def test_a_flat_picture_is_one_surface():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_labels_are_dense_and_every_border_lies_on_the_sheet(seed):
-    noise = np.random.default_rng(seed).random((6, 8, 3)).astype(np.float32).repeat(15, 0).repeat(15, 1)
+    noise = (
+        np.random.default_rng(seed).random((6, 8, 3)).astype(np.float32).repeat(15, 0).repeat(15, 1)
+    )
     label = parted(oklab(noise))
     assert label.shape == SHAPE and label.dtype == np.int32
     assert np.array_equal(np.unique(label), np.arange(label.max() + 1)) and label.max() > 5
 
 
 def test_more_difference_asked_for_parts_less():
-    lab = oklab(cv2.GaussianBlur(np.random.default_rng(1).random((*SHAPE, 3)).astype(np.float32), (0, 0), 5) * 4 - 1.5)
+    lab = oklab(
+        cv2.GaussianBlur(np.random.default_rng(1).random((*SHAPE, 3)).astype(np.float32), (0, 0), 5)
+        * 4
+        - 1.5
+    )
     number = [parted(lab, least=least).max() + 1 for least in (0.01, 0.05, 0.2, 1.0)]
     assert number == sorted(number, reverse=True) and number[0] > number[2] and number[-1] == 1
 
@@ -69,7 +81,10 @@ def test_merging_is_dearer_where_care_is_due():
     """Two like colours, and the same two again: they stay apart where care is due."""
     one, other = (np.array([L, 0.1, 0.05], np.float32) for L in (0.6, 0.64))
     lab = np.concatenate([np.tile(c, (90, 30, 1)) for c in (one, other) * 2], 1)
-    alone = [parted(lab[:, :60], np.full((90, 60), care, np.float32), NONE[:, :60]).max() for care in (0, 1)]
+    alone = [
+        parted(lab[:, :60], np.full((90, 60), care, np.float32), NONE[:, :60]).max()
+        for care in (0, 1)
+    ]
     assert alone == [0, 1]
 
 
@@ -87,9 +102,17 @@ def test_specks_are_no_surfaces():
     assert parted(lab).max() == 0
 
 
-@pytest.mark.parametrize("turn", [np.fliplr, np.flipud, lambda m: np.ascontiguousarray(np.swapaxes(m, 0, 1))])
+@pytest.mark.parametrize(
+    "turn", [np.fliplr, np.flipud, lambda m: np.ascontiguousarray(np.swapaxes(m, 0, 1))]
+)
 def test_a_mirrored_picture_has_mirrored_surfaces(turn):
-    noise = np.random.default_rng(2).random((4, 6, 3)).astype(np.float32).repeat(24, 0).repeat(20, 1)[:90]
+    noise = (
+        np.random.default_rng(2)
+        .random((4, 6, 3))
+        .astype(np.float32)
+        .repeat(24, 0)
+        .repeat(20, 1)[:90]
+    )
     lab = oklab(noise)
     mirrored = parted(np.ascontiguousarray(turn(lab)), *(np.ascontiguousarray(turn(NONE)),) * 2)
     assert agree(np.ascontiguousarray(turn(parted(lab))), mirrored) > 0.97
@@ -101,7 +124,9 @@ def test_tiny_pictures(shape):
     zero = np.zeros(shape, np.float32)
     label = surfaces.part(lab, zero, zero, TIP, LEAST)
     assert label.shape == shape and label.min() == 0
-    assert np.isfinite(surfaces.directions(np.dstack([lab, lab])[..., :3], label, zero, TIP, -50, 0.3)).all()
+    assert np.isfinite(
+        surfaces.directions(np.dstack([lab, lab])[..., :3], label, zero, TIP, -50, 0.3)
+    ).all()
 
 
 def slow_borders(label, lab):
@@ -119,7 +144,10 @@ def slow_borders(label, lab):
 
 def test_borders_are_those_of_the_slow_twin():
     rng = np.random.default_rng(4)
-    label, lab = rng.integers(0, 4, (12, 17)).astype(np.int32), rng.random((12, 17, 3)).astype(np.float32)
+    label, lab = (
+        rng.integers(0, 4, (12, 17)).astype(np.int32),
+        rng.random((12, 17, 3)).astype(np.float32),
+    )
     length, step = np.zeros((4, 4), np.float32), np.zeros((4, 4), np.float32)
     surfaces._borders(label, lab, length, step)
     expected = slow_borders(label, lab)
@@ -135,7 +163,10 @@ def slow_merge(means, size, length, step, large, edge, care, least):
         for i in range(len(size)):
             for j in range(i + 1, len(size)):
                 if root[i] == i and root[j] == j and length[i, j] > 0:
-                    off = np.linalg.norm(means[i, :4] - means[j, :4]) + edge * step[i, j] / length[i, j]
+                    off = (
+                        np.linalg.norm(means[i, :4] - means[j, :4])
+                        + edge * step[i, j] / length[i, j]
+                    )
                     dear = 1 + care * max(means[i, 4], means[j, 4])
                     price = off * dear * min(min(size[i], size[j]) / large, 1) ** 0.5
                     dearest = min(dearest, (price, i, j))
@@ -159,17 +190,21 @@ def test_merging_is_that_of_the_slow_twin(least):
         label[0, :] = np.arange(11)
         label[1, 0] = 11
         lab = rng.random((9, 11, 3)).astype(np.float32) * 0.4
-        means, size = surfaces._means(label, np.dstack([lab, rng.random((9, 11, 2)).astype(np.float32)]))
+        means, size = surfaces._means(
+            label, np.dstack([lab, rng.random((9, 11, 2)).astype(np.float32)])
+        )
         borders = slow_borders(label, lab)
         root = np.arange(12)
         expected = slow_merge(means, size, *(m.copy() for m in borders), 8.0, 0.7, 0.8, least)
         length, step = (m.astype(np.float32) for m in borders)
         numbers = (np.float32(v) for v in (8.0, 0.7, 0.8, least))
         surfaces._merge(means.copy(), size.copy(), length, step, *numbers, root)
-        assert (root[:, None] == root[None]).tolist() == (expected[:, None] == expected[None]).tolist()
+        assert (root[:, None] == root[None]).tolist() == (
+            expected[:, None] == expected[None]
+        ).tolist()
 
 
-# ---- families ----------------------------------------------------------------------------------------------
+# ---- families ------------------------------------------------------------------------------------
 
 
 def families(colours, kind=None, least=LEAST):
@@ -204,7 +239,7 @@ def test_families_are_dense():
     assert sorted(set(found)) == list(range(max(found) + 1)) and len(found) == 12 and max(found) > 2
 
 
-# ---- directions --------------------------------------------------------------------------------------------
+# ---- directions ----------------------------------------------------------------------------------
 
 
 def angles(tangent):
@@ -263,9 +298,16 @@ def test_a_heavy_wrist_overrules_the_form_of_the_whole():
     """In the mean of a surface; a large clear form within it is still followed."""
     weak = oklab((0.5 + 0.02 * (from_oklab(grating(20)) - 0.5)).astype(np.float32))
     label = np.ones((150, 150), np.int32)
-    light, heavy = (surfaces._direction(analysis.structure(weak, TIP), label.astype(np.float32),
-                                        np.array([np.cos(np.deg2rad(-100)), np.sin(np.deg2rad(-100))]) * wrist,
-                                        np.float32(1e-9), label.size) for wrist in (0.0, 100.0))  # fmt: skip
+    light, heavy = (
+        surfaces._direction(
+            analysis.structure(weak, TIP),
+            label.astype(np.float32),
+            np.array([np.cos(np.deg2rad(-100)), np.sin(np.deg2rad(-100))]) * wrist,
+            np.float32(1e-9),
+            label.size,
+        )
+        for wrist in (0.0, 100.0)
+    )
     assert apart(np.degrees(0.5 * np.arctan2(light[1], light[0])), 20) < 5
     assert apart(np.degrees(0.5 * np.arctan2(heavy[1], heavy[0])), -50) < 2
 
@@ -284,8 +326,15 @@ def test_strokes_follow_a_large_clear_form_and_more_so_where_care_is_due():
     grey = np.where(off < 70, 0.5 + 0.4 * np.sin(off / 4), 0.5)
     lab = oklab(np.repeat(grey[..., None], 3, 2).astype(np.float32))
     ring = (off > 35) & (off < 60)
-    plain, careful = (apart(angles(directed(lab, care=care)), np.degrees(np.arctan2(x, -y)))[ring] for care in (0, 1))
-    assert np.percentile(careful, 90) < 15 and careful.mean() < 0.7 * plain.mean() and plain.mean() < 35
+    plain, careful = (
+        apart(angles(directed(lab, care=care)), np.degrees(np.arctan2(x, -y)))[ring]
+        for care in (0, 1)
+    )
+    assert (
+        np.percentile(careful, 90) < 15
+        and careful.mean() < 0.7 * plain.mean()
+        and plain.mean() < 35
+    )
 
 
 def test_a_mirrored_picture_has_the_mirrored_field():
@@ -300,4 +349,6 @@ def test_directions_have_length_one():
     rng = np.random.default_rng(8)
     label = rng.integers(0, 5, (6, 8)).astype(np.int32).repeat(15, 0).repeat(15, 1)
     found = directed(rng.random((90, 120, 3)).astype(np.float32), label)
-    assert found.dtype == np.float32 and np.allclose(np.hypot(*np.moveaxis(found, 2, 0)), 1, atol=1e-5)
+    assert found.dtype == np.float32 and np.allclose(
+        np.hypot(*np.moveaxis(found, 2, 0)), 1, atol=1e-5
+    )

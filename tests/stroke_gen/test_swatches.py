@@ -10,7 +10,9 @@ TABLE = box()
 
 
 def test_bare_paper_has_no_wax_and_a_heavy_coat_is_all_wax():
-    grounds = np.stack([PAPER, PAPER - COVERED / 2, PAPER - COVERED, np.zeros(3, np.float32)]).astype(np.float32)
+    grounds = np.stack(
+        [PAPER, PAPER - COVERED / 2, PAPER - COVERED, np.zeros(3, np.float32)]
+    ).astype(np.float32)
     assert covered(grounds, PAPER) == pytest.approx([0, 0.5, 1, 1], abs=1e-5)
 
 
@@ -56,7 +58,9 @@ def test_lightness_orders_the_crayons():
 def test_the_table_of_some():
     some = TABLE.only([7, 2])
     assert some.names == (TABLE.names[7], TABLE.names[2])
-    assert (some.over(PAPER) == TABLE.over(PAPER)[[7, 2]]).all() and (some.grain == TABLE.grain[[7, 2]]).all()
+    assert (some.over(PAPER) == TABLE.over(PAPER)[[7, 2]]).all() and (
+        some.grain == TABLE.grain[[7, 2]]
+    ).all()
     assert (some.lightness() == TABLE.lightness()[[7, 2]]).all()
 
 
@@ -66,4 +70,6 @@ def test_a_finer_tip_is_pressed_harder():
     widths = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
     firm = np.array([firmness(w) for w in widths])
     assert (np.diff(firm) < 0).all() and (np.diff(firm * widths**2) > 0).all()
-    assert firmness(1.0) * firmness(TIP_MM * TIP_MM) == pytest.approx(1), "half the width and twice the width undo it"
+    assert firmness(1.0) * firmness(TIP_MM * TIP_MM) == pytest.approx(1), (
+        "half the width and twice the width undo it"
+    )

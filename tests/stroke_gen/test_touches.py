@@ -1,4 +1,6 @@
-"""Touches: small dark shapes that the sheet lacks are asked for, tones and specks are not; gains against a twin."""
+"""Touches: small dark shapes that the sheet lacks are asked for, tones and specks are not; gains
+against a twin.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -33,10 +35,13 @@ def photo_with(colour=(0.02, 0.02, 0.02), where=SPOT):
 def wanted(photo, now, coat=COAT, threads=2, **maps):
     maps = {"detail": np.ones(SHAPE, np.float32)} | maps
     plan = plan_of(scene_of(photo, **maps), POOLS[threads])
-    return {NAMES[k]: want for k, want in touches.wanted(plan, now.astype(np.float32), coat, CELLS).items()}
+    return {
+        NAMES[k]: want
+        for k, want in touches.wanted(plan, now.astype(np.float32), coat, CELLS).items()
+    }
 
 
-# ---- what is asked for -------------------------------------------------------------------------------------
+# ---- what is asked for ---------------------------------------------------------------------------
 
 
 def test_a_small_dark_shape_that_the_sheet_lacks_is_asked_for():
@@ -73,12 +78,22 @@ def test_a_shape_is_asked_for_on_a_sheet_of_other_tones():
 
 def test_a_soft_shade_is_not_asked_for():
     shade = np.linspace(0.8, 1.25, SHAPE[1], dtype=np.float32)[None, :, None]
-    assert wanted(shade * np.tile(GROUND, (*SHAPE, 1)), np.tile(GROUND, (*SHAPE, 1)), replace(COAT, gain=0.05)) == {}
+    assert (
+        wanted(
+            shade * np.tile(GROUND, (*SHAPE, 1)),
+            np.tile(GROUND, (*SHAPE, 1)),
+            replace(COAT, gain=0.05),
+        )
+        == {}
+    )
 
 
 @pytest.mark.parametrize("least, asked", [(1.0, True), (200.0, False)])
 def test_shapes_smaller_than_the_least_are_left_out(least, asked):
-    assert bool(wanted(photo_with(), np.tile(GROUND, (*SHAPE, 1)), replace(COAT, least=least))) is asked
+    assert (
+        bool(wanted(photo_with(), np.tile(GROUND, (*SHAPE, 1)), replace(COAT, least=least)))
+        is asked
+    )
 
 
 def test_every_shape_asked_for_is_as_large_as_the_least():
@@ -89,21 +104,27 @@ def test_every_shape_asked_for_is_as_large_as_the_least():
     wants = wanted(photo, np.tile(GROUND, (*SHAPE, 1)))
     assert wants
     for want in wants.values():
-        number, _, stats, _ = cv2.connectedComponentsWithStats((want > 0).astype(np.uint8), connectivity=4)
+        number, _, stats, _ = cv2.connectedComponentsWithStats(
+            (want > 0).astype(np.uint8), connectivity=4
+        )
         assert number > 1 and stats[1:, 4].min() >= COAT.least * CELLS**2
 
 
 def test_only_where_the_photo_has_detail():
     detail = np.zeros(SHAPE, np.float32)
     detail[:, :69] = 0.5
-    wants = wanted(photo_with(), np.tile(GROUND, (*SHAPE, 1)), replace(COAT, least=0.5), detail=detail)
+    wants = wanted(
+        photo_with(), np.tile(GROUND, (*SHAPE, 1)), replace(COAT, least=0.5), detail=detail
+    )
     asked = np.sum(list(wants.values()), 0) > 0
     assert asked[50:62, 61:66].all()
     assert not asked[:, 69 + 3 * int(CELLS) :].any()
 
 
 def test_without_detail_nothing_is_asked_for():
-    assert wanted(photo_with(), np.tile(GROUND, (*SHAPE, 1)), detail=np.zeros(SHAPE, np.float32)) == {}
+    assert (
+        wanted(photo_with(), np.tile(GROUND, (*SHAPE, 1)), detail=np.zeros(SHAPE, np.float32)) == {}
+    )
 
 
 def test_a_gain_too_small_is_left():
@@ -118,7 +139,9 @@ def test_bare_paper_is_left_bare():
 
 @pytest.mark.parametrize("hardest", [0.1, 0.4])
 def test_no_harder_than_the_hardest(hardest):
-    wants = wanted(photo_with(), np.tile(GROUND, (*SHAPE, 1)), replace(COAT, hardest=hardest, gain=0.0))
+    wants = wanted(
+        photo_with(), np.tile(GROUND, (*SHAPE, 1)), replace(COAT, hardest=hardest, gain=0.0)
+    )
     assert wants and max(want.max() for want in wants.values()) <= hardest * 1.001
 
 
@@ -132,20 +155,28 @@ def test_skin_is_touched_with_nothing_foreign():
 
 
 def test_each_place_is_asked_one_crayon():
-    photo = np.random.default_rng(1).random((12, 15, 3)).astype(np.float32).repeat(10, 0).repeat(10, 1)
+    photo = (
+        np.random.default_rng(1).random((12, 15, 3)).astype(np.float32).repeat(10, 0).repeat(10, 1)
+    )
     wants = wanted(photo, np.tile(GROUND, (*SHAPE, 1)))
     hard = [want > 0 for want in wants.values()]
     assert len(hard) > 2 and np.sum(hard, 0).max() == 1
 
 
 def test_touches_are_the_same_with_any_number_of_threads():
-    photo = np.random.default_rng(2).random((12, 15, 3)).astype(np.float32).repeat(10, 0).repeat(10, 1)
+    photo = (
+        np.random.default_rng(2).random((12, 15, 3)).astype(np.float32).repeat(10, 0).repeat(10, 1)
+    )
     first, *others = (wanted(photo, np.tile(GROUND, (*SHAPE, 1)), threads=n) for n in POOLS)
     for other in others:
-        assert first and first.keys() == other.keys() and all((first[k] == other[k]).all() for k in first)
+        assert (
+            first
+            and first.keys() == other.keys()
+            and all((first[k] == other[k]).all() for k in first)
+        )
 
 
-# ---- gains -------------------------------------------------------------------------------------------------
+# ---- gains ---------------------------------------------------------------------------------------
 
 
 def slow_gains(current, lab, table, k, coat):

@@ -30,7 +30,9 @@ def draw(live, points, crayon="red", tip=TIPS[0]):
 
 
 def straight(rng):
-    """Points on a line, its heading not at the border between two of box's; often over the edge of the sheet."""
+    """Points on a line, its heading not at the border between two of box's; often over the edge of
+    the sheet.
+    """
     angle = np.pi / box.HEADINGS * (rng.integers(2 * box.HEADINGS) + rng.uniform(-0.4, 0.4))
     way = np.sort(rng.uniform(0, 20, 6))
     way[0] = 0
@@ -41,14 +43,19 @@ def straight(rng):
 def bent(rng):
     """Points on a way that turns, some of them nearer together than a stroke needs to begin."""
     steps = rng.normal(0, 1, (12, 2)) * rng.choice([0.1, 3], (12, 1))
-    return np.column_stack([rng.uniform((0, 0), (60, 40)) + np.cumsum(steps, 0), rng.uniform(0, 4, 12)])
+    return np.column_stack(
+        [rng.uniform((0, 0), (60, 40)) + np.cumsum(steps, 0), rng.uniform(0, 4, 12)]
+    )
 
 
 def wax(easel):
     """All that a sheet and the crayons hold."""
     sheet = easel.sheet
     arrays = (sheet.total, sheet.used, sheet.crayon, sheet.layer, sheet.blend)
-    used = [{key: value for key, value in d.items() if value} for d in (easel.box.worn_um, easel.box.given_mm3)]
+    used = [
+        {key: value for key, value in d.items() if value}
+        for d in (easel.box.worn_um, easel.box.given_mm3)
+    ]
     return [a.tobytes() for a in arrays], used
 
 
@@ -57,7 +64,10 @@ def wax(easel):
 def test_segments_joined_are_the_strokes_of_rub(way, physics, monkeypatch):
     if way is bent:
         monkeypatch.setattr(box, "HEADINGS", 1)
-    live, rng = Live(Drawing(60.0, 40.0, "drawing", "box8", (), physics), SIZE), np.random.default_rng(3)
+    live, rng = (
+        Live(Drawing(60.0, 40.0, "drawing", "box8", (), physics), SIZE),
+        np.random.default_rng(3),
+    )
     for number in range(60):
         draw(live, way(rng), CRAYONS[number % 3], TIPS[number % 4])
     assert len(live.easel.box.masks) > 1 + len(TIPS)  # the tips have worn
@@ -122,16 +132,23 @@ def test_pressing_alone_is_a_dab(live):
     assert (change.pixels[..., 0] > change.pixels[..., 2] + 40).any()
     (dab,) = live.drawing().strokes
     assert dab.path_mm.tolist() == [[30, 20]] and dab.note == "line"
-    assert pipeline.draw(live.drawing(), SIZE).sheet.total.tobytes() == live.easel.sheet.total.tobytes()
+    assert (
+        pipeline.draw(live.drawing(), SIZE).sheet.total.tobytes()
+        == live.easel.sheet.total.tobytes()
+    )
 
 
 def test_beside_the_sheet_nothing_changes(live):
-    assert all(change.pixels.shape == (0, 0, 3) for change in draw(live, [(-20, -20, 3), (-30, 60, 3)]))
+    assert all(
+        change.pixels.shape == (0, 0, 3) for change in draw(live, [(-20, -20, 3), (-30, 60, 3)])
+    )
     assert not live.easel.sheet.total.any() and len(live.drawing().strokes) == 1
 
 
 def test_strokes_that_are_there_come_first():
-    first = Stroke(np.array([[5, 5], [50, 30]], np.float32), np.full(2, 3, np.float32), "blue", TIPS[0])
+    first = Stroke(
+        np.array([[5, 5], [50, 30]], np.float32), np.full(2, 3, np.float32), "blue", TIPS[0]
+    )
     live = Live(Drawing(60.0, 40.0, "kraft", "box8", (first,), seed=5), SIZE)
     np.testing.assert_array_equal(live.picture(), api.draw(live.drawing(), SIZE))
     draw(live, [(30, 5, 3), (30, 35, 3)], "yellow")
@@ -145,7 +162,7 @@ def test_a_new_sheet_is_blank_and_no_crayon_is_used(live):
     assert not any(live.easel.box.worn_um.values()) and not any(live.easel.box.given_mm3.values())
 
 
-# ---- what is refused -------------------------------------------------------------------------------------
+# ---- what is refused -----------------------------------------------------------------------------
 
 NAN, INF = float("nan"), float("inf")
 
@@ -169,7 +186,9 @@ def test_bad_press_is_refused_and_leaves_the_sheet_usable(live, words, press):
     assert len(live.drawing().strokes) == 1
 
 
-@pytest.mark.parametrize("point", [(NAN, 1, 1), (1, -INF, 1), (1, 1, -0.001), (1, 1, 101), (1, 81, 1)], ids=str)
+@pytest.mark.parametrize(
+    "point", [(NAN, 1, 1), (1, -INF, 1), (1, 1, -0.001), (1, 1, 101), (1, 81, 1)], ids=str
+)
 def test_bad_move_is_refused_and_the_stroke_goes_on(live, point):
     live.press(10, 10, 2, "red")
     live.move(20, 10, 2)

@@ -1,4 +1,6 @@
-"""Paper: its tooth is the same in mm at any resolution, alike in all directions, and tiles without a seam."""
+"""Paper: its tooth is the same in mm at any resolution, alike in all directions, and tiles without
+a seam.
+"""
 
 import cv2
 import numpy as np
@@ -43,8 +45,14 @@ def test_a_paper_has_the_same_tooth_at_both_resolutions(name, cells_mm):
             blur = 0.3 / cell_mm
             field = cv2.GaussianBlur(field, (0, 0), blur)
         depths.append(np.ptp(np.percentile(field, (0.5, 99.5))))
-        lengths.append(np.mean([correlation_mm(field, cell_mm, way) for way in ((0, 1), (1, 0), (1, 1), (1, -1))]))
-        assert ((field == field.min()) | (field == field.max())).mean() < 0.015 or described.texture == "stipple"
+        lengths.append(
+            np.mean(
+                [correlation_mm(field, cell_mm, way) for way in ((0, 1), (1, 0), (1, 1), (1, -1))]
+            )
+        )
+        assert (
+            (field == field.min()) | (field == field.max())
+        ).mean() < 0.015 or described.texture == "stipple"
     if described.texture == "pressed":
         assert depths[1] == pytest.approx(depths[0], rel=0.05)
     else:
@@ -54,8 +62,12 @@ def test_a_paper_has_the_same_tooth_at_both_resolutions(name, cells_mm):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_grain_grows_with_the_wavelength(kind):
-    short, long = (np.mean([correlation_mm(heights(kind, wavelength_mm=w, seed=s), 0.1, (0, 1)) for s in range(3)])
-                   for w in (0.5, 1.0))  # fmt: skip
+    short, long = (
+        np.mean(
+            [correlation_mm(heights(kind, wavelength_mm=w, seed=s), 0.1, (0, 1)) for s in range(3)]
+        )
+        for w in (0.5, 1.0)
+    )
     if kind == "pressed":  # of which the waves finer than the grain stay
         assert 1.3 * short < long < 2 * short
     else:
@@ -92,13 +104,16 @@ def test_patches_join_without_a_seam(kind, monkeypatch):
     for axis in (0, 1):
         steps = np.abs(np.diff(field, axis=axis)).mean(1 - axis)
         seams = steps[[63, 127]].mean()
-        period = np.array([np.abs(np.diff(np.roll(field[:64, :64], -k, axis), axis=axis)).mean() for k in (0, 9)])
+        period = np.array(
+            [np.abs(np.diff(np.roll(field[:64, :64], -k, axis), axis=axis)).mean() for k in (0, 9)]
+        )
         assert seams < 1.5 * steps.mean() and period[0] == pytest.approx(period[1], rel=0.1)
 
 
 def test_dots_keep_their_distance_over_the_seam(monkeypatch):
     monkeypatch.setattr(paper, "PATCH", 64)
-    field = cv2.GaussianBlur(heights("stipple", 192, wavelength_mm=0.45), (0, 0), 3)  # 18 cells do not divide 64
+    # 18 cells do not divide 64
+    field = cv2.GaussianBlur(heights("stipple", 192, wavelength_mm=0.45), (0, 0), 3)
     rows = field.reshape(12, 16, 192).mean(1)  # every second row of dots is shifted by a half
     similar = np.corrcoef(rows)
     assert np.diag(similar, 1).max() < 0 < 0.5 < np.diag(similar, 2).min()
@@ -110,7 +125,9 @@ def test_dots_keep_their_distance_over_the_seam(monkeypatch):
     np.testing.assert_allclose(gaps.min(0), 17, atol=4)
 
 
-@pytest.mark.parametrize("spot_shape", [(3, 5), (9, 12)], ids=["smaller", "larger than the lattice"])
+@pytest.mark.parametrize(
+    "spot_shape", [(3, 5), (9, 12)], ids=["smaller", "larger than the lattice"]
+)
 def test_a_spot_is_laid_on_every_point_of_the_lattice_and_wraps_round(spot_shape):
     rng = np.random.default_rng(2)
     noise, spot = rng.random((6, 10), np.float32), rng.random(spot_shape, np.float32)
@@ -129,8 +146,11 @@ def test_the_seed_alone_decides():
 def test_pits_make_a_plateau_with_pits():
     even, pitted = heights("felt"), heights("felt", pits=3.0)
     assert pitted.mean() > even.mean() + 8
-    assert np.percentile(pitted, 50) - np.percentile(pitted, 1) > 1.5 * np.ptp(np.percentile(pitted, (50, 99)))
-    assert (np.diff(pitted.ravel()[np.argsort(even, axis=None)]) >= -1e-3).all()  # the same order of heights
+    assert np.percentile(pitted, 50) - np.percentile(pitted, 1) > 1.5 * np.ptp(
+        np.percentile(pitted, (50, 99))
+    )
+    # the same order of heights
+    assert (np.diff(pitted.ravel()[np.argsort(even, axis=None)]) >= -1e-3).all()
 
 
 def test_a_pressed_paper_is_even_with_pits_down_to_the_finest_cells():
@@ -146,13 +166,20 @@ def test_a_pressed_paper_is_even_with_pits_down_to_the_finest_cells():
 
 
 def test_fine_waves_of_a_pressed_paper_are_not_folded_into_coarse_ones():
-    """A wave shorter than two cells is left out; felt and scans keep as much height whatever the cells."""
+    """A wave shorter than two cells is left out; felt and scans keep as much height whatever the
+    cells.
+    """
     power = []
     for cell_mm in (0.3, 0.05):
         fields = [heights("pressed", round(24 / cell_mm), cell_mm, seed) for seed in range(3)]
         spectra = [np.abs(np.fft.rfft2(f - f.mean())) ** 2 / f.size**2 for f in fields]
-        wave = np.hypot(np.fft.fftfreq(len(fields[0]), cell_mm)[:, None], np.fft.rfftfreq(len(fields[0]), cell_mm))
-        power.append([np.sum(spectra, 0)[(wave > a) & (wave < b)].sum() for a, b in ((0.3, 0.8), (0.8, 1.4))])
+        wave = np.hypot(
+            np.fft.fftfreq(len(fields[0]), cell_mm)[:, None],
+            np.fft.rfftfreq(len(fields[0]), cell_mm),
+        )
+        power.append(
+            [np.sum(spectra, 0)[(wave > a) & (wave < b)].sum() for a, b in ((0.3, 0.8), (0.8, 1.4))]
+        )
     assert power[0] == pytest.approx(power[1], rel=0.2)
 
 
@@ -163,7 +190,7 @@ def test_small_sheets_have_paper_too(kind, rows, cols):
     assert field.shape == (rows, cols) and np.isfinite(field).all() and field.flags.c_contiguous
 
 
-# ---- a picture as paper -----------------------------------------------------------------------------------
+# ---- a picture as paper --------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -192,7 +219,7 @@ def test_a_picture_may_be_named_by_its_path_alone(picture):
     assert paper.tooth(paper.load_paper(picture), 20, 40, 0.1, 0).max() > 70
 
 
-# ---- specs ------------------------------------------------------------------------------------------------
+# ---- specs ---------------------------------------------------------------------------------------
 
 
 def test_a_paper_by_name_by_colour_and_by_table():
@@ -226,7 +253,10 @@ def test_shipped_papers_are_sound(name):
         ({"colour": 5}, "paper.colour: 5 is not a text"),
         ({"colour": "red"}, "colour: 'red' is not #rrggbb"),
         ({"texture": None}, "paper.texture: None is not a text"),
-        ({"texture": "nowhere.png"}, "paper.texture: 'nowhere.png' is neither one of pressed, lunar"),
+        (
+            {"texture": "nowhere.png"},
+            "paper.texture: 'nowhere.png' is neither one of pressed, lunar",
+        ),
         ({"name": "velvet"}, "paper: 'velvet' is neither"),
         (7, "paper: 7 is neither a name nor a table"),
         (None, "paper: None is neither a name nor a table"),
@@ -240,5 +270,9 @@ def test_a_wrong_paper_is_named_in_one_line(spec, message):
 
 
 def test_colours_are_decoded_as_srgb():
-    assert paper.colour_linear("#000000") == (0, 0, 0) and paper.colour_linear("ffffff") == (1, 1, 1)
+    assert paper.colour_linear("#000000") == (0, 0, 0) and paper.colour_linear("ffffff") == (
+        1,
+        1,
+        1,
+    )
     assert paper.colour_linear("#0a80ff") == pytest.approx((0.003035, 0.215861, 1.0), abs=1e-6)

@@ -21,7 +21,9 @@ def packed(paths):
 
 def random_paths(rng, number, size, far=60):
     return [
-        rng.uniform(-0.1, 1.1, 2) * size + np.cumsum(rng.normal(0, far, (rng.integers(1, 5), 2)), 0) - far / 2
+        rng.uniform(-0.1, 1.1, 2) * size
+        + np.cumsum(rng.normal(0, far, (rng.integers(1, 5), 2)), 0)
+        - far / 2
         for _ in range(number)
     ]
 
@@ -93,7 +95,9 @@ def test_no_tile_within_reach_of_a_path_is_missed():
 
 
 def test_strokes_of_one_level_change_disjoint_cells(bench, monkeypatch):
-    """Smearing included: each stroke is drawn alone on a coated sheet, and what it changes is compared."""
+    """Smearing included: each stroke is drawn alone on a coated sheet, and what it changes is
+    compared.
+    """
     rng = np.random.default_rng(3)
     strokes = bench.scribble(rng, 60, 20.0)
     found, search = [], schedule.order
@@ -116,7 +120,9 @@ def test_strokes_of_one_level_change_disjoint_cells(bench, monkeypatch):
 @pytest.mark.parametrize("kind", ["blunt", "side"])
 def test_no_cell_beyond_the_reach_is_changed(bench, monkeypatch, kind):
     reaches, search = [], schedule.order
-    monkeypatch.setattr(schedule, "order", lambda *given: reaches.append(given[2][0]) or search(*given))
+    monkeypatch.setattr(
+        schedule, "order", lambda *given: reaches.append(given[2][0]) or search(*given)
+    )
     rng = np.random.default_rng(5)
     for _ in range(30):
         sheet = bench.sheet(np.zeros((80, 80)))
@@ -146,7 +152,10 @@ def test_every_stroke_is_drawn_once_and_after_those_it_waits_for(threads):
     rng = np.random.default_rng(4)
     points, first = packed(random_paths(rng, 300, 900))
     order = schedule.order(points, first, np.full(300, 5, np.float32), 900, 900)
-    before = [{p for p in range(300) if s in order.heirs[order.first[p] : order.first[p + 1]]} for s in range(300)]
+    before = [
+        {p for p in range(300) if s in order.heirs[order.first[p] : order.first[p + 1]]}
+        for s in range(300)
+    ]
     lock, done, reported = threading.Lock(), [], []
 
     def see(stroke):

@@ -10,7 +10,9 @@ KINDS = ("sharp", "blunt", "rim", "side")
 
 
 def made(kind="blunt", width_mm=2.4, cell_mm=0.1, worn_um=0.0, angle_deg=0.0, seed=0):
-    return tip.mask(Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed), 0.0, worn_um)
+    return tip.mask(
+        Tip(kind, width_mm, angle_deg), cell_mm, np.random.default_rng(seed), 0.0, worn_um
+    )
 
 
 def extent_mm(mask, cell_mm):
@@ -68,7 +70,11 @@ def test_a_sharp_tip_falls_away_faster_than_a_blunt_one(monkeypatch):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_wear_cuts_the_profile_flat_from_below(kind, monkeypatch):
-    """... at the level at which what is cut off has the mean height asked for; at `flat_um` nothing is left."""
+    """...
+
+    at the level at which what is cut off has the mean height asked for; at `flat_um` nothing is
+    left.
+    """
     monkeypatch.setattr(tip, "BUMP_UM", 0.0)
     fresh = made(kind)
     there = fresh < tip.ABSENT
@@ -105,7 +111,9 @@ def test_bumps_have_their_height_and_wavelength_in_mm(monkeypatch):
         inner = [m[n // 4 : -n // 4, n // 4 : -n // 4] for m in masks]
         spread.append(np.mean([m.std() for m in inner]))
         slope.append(np.mean([np.gradient(m, axis=0).std() / cell_mm for m in inner]))
-    assert spread[0] == pytest.approx(spread[1], rel=0.15) and slope[0] == pytest.approx(slope[1], rel=0.25)
+    assert spread[0] == pytest.approx(spread[1], rel=0.15) and slope[0] == pytest.approx(
+        slope[1], rel=0.25
+    )
     assert 0.2 * tip.BUMP_UM < spread[0] < tip.BUMP_UM
 
 

@@ -28,24 +28,38 @@ def assert_same(sheet, columns, tolerance=2e-3):
         twin = columns[at]
         both = [[[c, h] for c, h in layers if h > 1e-4] for layers in (column.layers, twin.layers)]
         assert [c for c, _ in both[0]] == [c for c, _ in both[1]], at
-        np.testing.assert_allclose([h for _, h in both[0]], [h for _, h in both[1]], rtol=1e-4, atol=tolerance)
+        np.testing.assert_allclose(
+            [h for _, h in both[0]], [h for _, h in both[1]], rtol=1e-4, atol=tolerance
+        )
         np.testing.assert_allclose(column.blend, twin.blend, rtol=1e-4, atol=tolerance)
         cell = at[0] * sheet.cols + at[1]
         assert abs(sheet.total[cell] - twin.wax()) < tolerance + 1e-4 * twin.wax(), at
 
 
 class Window:
-    """A tip over a sheet, ready for the kernels of one contact; its mask has a border of `reach` absent cells."""
+    """A tip over a sheet, ready for the kernels of one contact; its mask has a border of `reach`
+    absent cells.
+    """
 
     def __init__(self, sheet, mask, top, left, wanted, reach=1):
         self.sheet, self.top, self.left, self.reach = sheet, top, left, reach
         self.side, self.size, self.home = mask.shape[0], mask.size, top * sheet.cols + left
         self.w = window.window(mask.size, len(sheet.optics))
         self.w.mask[:] = mask.ravel()
-        self.w.where[:] = (np.arange(self.side)[:, None] * sheet.cols + np.arange(self.side)).ravel()
+        self.w.where[:] = (
+            np.arange(self.side)[:, None] * sheet.cols + np.arange(self.side)
+        ).ravel()
         present = int((mask < ABSENT).sum())
         share = window.look(
-            self.w, self.side, present, top, left, sheet.rows, sheet.cols, np.float32(1), sheet.columns()
+            self.w,
+            self.side,
+            present,
+            top,
+            left,
+            sheet.rows,
+            sheet.cols,
+            np.float32(1),
+            sheet.columns(),
         )
         self.inside, self.gap = share * present, self.w.over.copy()
         self.h = balance(self.w.over, np.float32(wanted), np.float32(1e9), np.float32(1e-3))
@@ -70,12 +84,15 @@ class Window:
         return {self.cell(at): float(self.inflow[at]) for at in np.flatnonzero(self.inflow)}
 
     def smear(self, direction, crayon, nu, yields, alpha=0.2, beta=0.8):
-        """Smear, and lay all wax but that of the crayon in hand; returns how many other crayons moved."""
+        """Smear, and lay all wax but that of the crayon in hand; returns how many other crayons
+        moved.
+        """
         columns, v = self.sheet.columns(), np.float32(direction)
         smear.open_slot(self.w, self.size, 0, crayon, 0)
         smear.weigh(self.w, self.side, self.reach, v[0], v[1], np.float32(alpha), np.float32(beta))
-        slots = smear.smear(self.w, self.side, self.reach, self.home, np.float32(nu), np.float32(yields),
-                               columns)  # fmt: skip
+        slots = smear.smear(
+            self.w, self.side, self.reach, self.home, np.float32(nu), np.float32(yields), columns
+        )
         own = self.inflow.copy()
         self.inflow[:] = 0
         smear.settle(self.w, slots, self.home, np.float32(THIN_UM), columns)
@@ -85,7 +102,9 @@ class Window:
     def deposit(self, direction, push, constants):
         """Rub wax off over one cell of the way; returns the loss."""
         v = np.float32(direction)
-        return deposit(self.w, self.side, self.reach, v[0], v[1], np.float32(push), np.float32(1), constants)
+        return deposit(
+            self.w, self.side, self.reach, v[0], v[1], np.float32(push), np.float32(1), constants
+        )
 
 
 def constants_of(bench, **values):
@@ -111,7 +130,7 @@ def corners(sheet, side=WINDOW):
     return itertools.product(tops, lefts)
 
 
-# ---- the kernels and their twins --------------------------------------------------------------------------
+# ---- the kernels and their twins -----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("start", [1e9, 500.0, 30.0, -2000.0])
@@ -132,14 +151,19 @@ def test_add_keeps_order_merges_colours_and_sinks_into_the_blend(bench):
     column = naive.columns_of(sheet)[0, 0]
     sunk = 0
     for _ in range(3000):
-        crayon, height = int(rng.integers(len(sheet.optics))), float(np.float32(3 * rng.random() ** 4))
+        crayon, height = (
+            int(rng.integers(len(sheet.optics))),
+            float(np.float32(3 * rng.random() ** 4)),
+        )
         wax.add(0, np.uint8(crayon), np.float32(height), np.float32(THIN_UM), sheet.columns())
         naive.add(column, crayon, height, sheet.optics)
         assert sheet.crayon[0, : sheet.used[0]].tolist() == [c for c, _ in column.layers]
         sunk += column.blend[0] > 0
     assert sunk > 2000
     np.testing.assert_allclose(sheet.blend[0], column.blend, rtol=1e-4)
-    np.testing.assert_allclose(sheet.layer[0, : sheet.used[0]], [h for _, h in column.layers], rtol=1e-4)
+    np.testing.assert_allclose(
+        sheet.layer[0, : sheet.used[0]], [h for _, h in column.layers], rtol=1e-4
+    )
 
 
 def test_look_sees_the_surface_and_nothing_off_the_sheet(bench):
@@ -156,7 +180,8 @@ def test_look_sees_the_surface_and_nothing_off_the_sheet(bench):
 
 
 @pytest.mark.parametrize(
-    "nu, reach, yields", [(0.1, 1, 0.0), (0.6, 1, 5.0), (0.95, 1, 0.0), (0.6, 2, 0.0), (0.6, 3, 20.0)]
+    "nu, reach, yields",
+    [(0.1, 1, 0.0), (0.6, 1, 5.0), (0.95, 1, 0.0), (0.6, 2, 0.0), (0.6, 3, 20.0)],
 )
 def test_smear_is_fig_7(bench, nu, reach, yields):
     rng = np.random.default_rng(4)
@@ -169,7 +194,9 @@ def test_smear_is_fig_7(bench, nu, reach, yields):
         before = sum(c.blend[0] for c in columns.values())
         direction = towards(40 * turn)
         others += window.smear(direction, turn % 3, nu, yields)
-        own = naive.smear(columns, over, tops, direction, turn % 3, nu, 0.2, 0.8, sheet.optics, reach, yields)
+        own = naive.smear(
+            columns, over, tops, direction, turn % 3, nu, 0.2, 0.8, sheet.optics, reach, yields
+        )
         assert_same(sheet, columns)
         for at in own.keys() | window.own().keys():
             assert abs(own.get(at, 0.0) - window.own().get(at, 0.0)) < 1e-3
@@ -178,7 +205,8 @@ def test_smear_is_fig_7(bench, nu, reach, yields):
 
 
 @pytest.mark.parametrize(
-    "push, rate, heap, firm", [(0.3, 0.4, 0, 1), (1.0, 0.4, 0.6, 0.3), (4.0, 0.4, 1, 1), (1.0, 3.0, 0.3, 0)]
+    "push, rate, heap, firm",
+    [(0.3, 0.4, 0, 1), (1.0, 0.4, 0.6, 0.3), (4.0, 0.4, 1, 1), (1.0, 3.0, 0.3, 0)],
 )
 def test_deposit_is_fig_6(bench, push, rate, heap, firm):
     rng = np.random.default_rng(5)
@@ -191,7 +219,9 @@ def test_deposit_is_fig_6(bench, push, rate, heap, firm):
         columns, own = naive.columns_of(sheet), window.own()
         tops = {at: column.top() for at, column in columns.items()}
         before = {at: column.wax() for at, column in columns.items()}
-        constants = constants_of(bench, rate=rate, film=5.0, relief=0.2, wear=0.7, heap=heap, firm=firm)
+        constants = constants_of(
+            bench, rate=rate, film=5.0, relief=0.2, wear=0.7, heap=heap, firm=firm
+        )
         direction, worn = towards(35 * turn), window.heights()
         lost = naive.deposit(
             columns, window.overlaps(), tops, before, direction, own, worn, push, rate, constants
@@ -224,7 +254,8 @@ def test_a_stroke_is_fig_3(bench, path, reach):
     mask = small_mask(rng, reach=reach)
     per_lambda = np.float32(1 / (bench.physics.lam * sheet.cell_mm**2))
     points = np.stack([x, y, um * (mask < ABSENT).sum() / per_lambda], 1)
-    constants = bench.changed(epsilon_um=1e-4).physics.constants(sheet.cell_mm)  # the twin's force is exact
+    # the twin's force is exact
+    constants = bench.changed(epsilon_um=1e-4).physics.constants(sheet.cell_mm)
     mean, scatter = {1: (1.0, 0.0), 2: (1.5, 0.5)}[reach]
     constants = constants._replace(hop=np.float32(mean), scatter=np.float32(scatter))
     desk, crayon = window.window(mask.size, len(sheet.optics)), 2
@@ -232,13 +263,15 @@ def test_a_stroke_is_fig_3(bench, path, reach):
     table = contact.Table(smears, constants, per_lambda, sheet.rows, sheet.cols, sheet.columns())
     held = contact.press(desk, mask.ravel(), crayon, len(mask), reach, sheet.cols)
     loss = contact.stroke(desk, held, table, points)
-    given = naive.rub(columns, points, mask, crayon, smears, constants, float(per_lambda), sheet.optics, reach)
+    given = naive.rub(
+        columns, points, mask, crayon, smears, constants, float(per_lambda), sheet.optics, reach
+    )
     assert given > 1
     assert loss == pytest.approx(given, rel=1e-3)
     assert_same(sheet, columns, 0.02)
 
 
-# ---- what is conserved ------------------------------------------------------------------------------------
+# ---- what is conserved ---------------------------------------------------------------------------
 
 
 def column_sums(sheet):
@@ -253,8 +286,12 @@ def test_the_sheet_gains_what_the_crayons_lose(bench):
     given = rub.rub(sheet, bench.scribble(np.random.default_rng(7), 60, 15.0), box, threads=2)
     assert given > 1000
     assert pigments(sheet)[0] == pytest.approx(given, rel=1e-5)
-    by_crayon = [box.given_mm3.get(c.name, 0.0) * 1000 / sheet.cell_mm**2 for c in bench.palette.crayons]
-    np.testing.assert_allclose(pigments(sheet)[1:], by_crayon @ sheet.optics.astype(float), rtol=1e-4)
+    by_crayon = [
+        box.given_mm3.get(c.name, 0.0) * 1000 / sheet.cell_mm**2 for c in bench.palette.crayons
+    ]
+    np.testing.assert_allclose(
+        pigments(sheet)[1:], by_crayon @ sheet.optics.astype(float), rtol=1e-4
+    )
 
 
 def test_the_mask_loses_its_share_of_what_breaks_off(bench):
@@ -262,7 +299,9 @@ def test_the_mask_loses_its_share_of_what_breaks_off(bench):
     sheet = bench.sheet(40 * rng.random((20, 20)))
     window = Window(sheet, small_mask(rng), 4, 4, 300.0)
     before = window.w.mask.astype(float)
-    lost = window.deposit(towards(20), 1.0, constants_of(bench, rate=0.3, relief=1.0, wear=0.25, heap=0.5))
+    lost = window.deposit(
+        towards(20), 1.0, constants_of(bench, rate=0.3, relief=1.0, wear=0.25, heap=0.5)
+    )
     assert (window.w.mask - before)[before < ABSENT].sum() == pytest.approx(0.25 * lost, rel=1e-4)
     assert window.inflow.sum(dtype=float) == pytest.approx(lost, rel=1e-5)
     untouched = np.setdiff1d(np.arange(before.size), window.touch)
@@ -284,12 +323,16 @@ def test_no_negative_no_nan_after_many_strokes(bench):
     sheet = bench.felt(120, 120)
     bench.draw(sheet, bench.scribble(rng, 700, 12.0, um=20.0), threads=2)
     assert (sheet.used == wax.LAYERS).mean() > 0.3 and (sheet.blend[:, 0] > 0).mean() > 0.3
-    for heights in (sheet.total, sheet.layer[np.arange(wax.LAYERS) < sheet.used[:, None]], sheet.blend):
+    for heights in (
+        sheet.total,
+        sheet.layer[np.arange(wax.LAYERS) < sheet.used[:, None]],
+        sheet.blend,
+    ):
         assert np.isfinite(heights).all() and heights.min() >= 0
     np.testing.assert_allclose(sheet.total, column_sums(sheet), rtol=1e-5, atol=1e-3)
 
 
-# ---- the force --------------------------------------------------------------------------------------------
+# ---- the force -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["sharp", "blunt", "rim", "side"])
@@ -302,17 +345,23 @@ def test_the_force_is_reached_over_five_decades(bench, kind, teeth):
         sheet.total[:] = teeth * 45 * rng.random(sheet.total.size)
         mask = np.pad(tip_mask(Tip(kind, 1.6), 0.1, rng), 1, constant_values=ABSENT)
         window = Window(sheet, mask, 9, 9, 1.0)
-        for start, wanted in itertools.product((np.float32(1e9), window.h), np.float32(10.0) ** np.arange(0, 5.1)):
+        for start, wanted in itertools.product(
+            (np.float32(1e9), window.h), np.float32(10.0) ** np.arange(0, 5.1)
+        ):
             allowed = min(epsilon, 0.01 * wanted)
             h = balance(window.gap, wanted, start, np.float32(allowed))
-            assert np.maximum(window.gap.astype(float) - h, 0).sum() == pytest.approx(wanted, abs=allowed, rel=1e-6)
+            assert np.maximum(window.gap.astype(float) - h, 0).sum() == pytest.approx(
+                wanted, abs=allowed, rel=1e-6
+            )
 
 
 @pytest.mark.parametrize("kind", ["sharp", "blunt", "rim", "side"])
 def test_the_first_touch_of_every_dab_leaves_wax(bench, kind):
     bench = bench.changed(relief=0.0)
     tip = Tip(kind, 2.0)  # paper and wax stand anywhere between 0 and 70 um
-    for height, um, cell_mm in itertools.product(np.arange(1.0, 70.0, 7.0), (0.02, 1.0, 20.0), (0.2, 0.1, 0.05)):
+    for height, um, cell_mm in itertools.product(
+        np.arange(1.0, 70.0, 7.0), (0.02, 1.0, 20.0), (0.2, 0.1, 0.05)
+    ):
         n = round(4 / cell_mm)
         sheet = bench.sheet(np.full((n, n), height), cell_mm)
         assert bench.draw(sheet, [bench.stroke([[2, 2]], um, tip=tip)]) > 0
@@ -348,7 +397,11 @@ def hatching(bench, um, size_mm, angle=0.0, crayon="red", spacing=0.5, margin=0.
     along, across = np.array(towards(angle)), np.array(towards(angle + 90))
     offsets = np.arange(-np.floor(half / gap), np.floor(half / gap) + 1) * gap
     return [
-        bench.stroke([size_mm / 2 + across * o - along * half, size_mm / 2 + across * o + along * half], um, crayon)
+        bench.stroke(
+            [size_mm / 2 + across * o - along * half, size_mm / 2 + across * o + along * half],
+            um,
+            crayon,
+        )
         for o in offsets
     ]
 
@@ -366,7 +419,7 @@ def test_peaks_take_wax_before_valleys(bench):
     assert hard_valley > 2 * light_valley and hard_peak < light_peak
 
 
-# ---- direction --------------------------------------------------------------------------------------------
+# ---- direction -----------------------------------------------------------------------------------
 
 
 def test_reversing_a_stroke_coats_the_other_faces(bench):
@@ -406,19 +459,24 @@ def test_a_stroke_lies_where_its_path_lies(bench, monkeypatch):
             assert (across * film).sum() / film.sum() == pytest.approx(place, abs=0.1 * cell_mm)
 
 
-# ---- wax on wax -------------------------------------------------------------------------------------------
+# ---- wax on wax ----------------------------------------------------------------------------------
 
 
 def test_a_second_colour_is_taken_up_less_where_wax_lies(bench):
     sheet = bench.felt(120, 240)
     bench.draw(sheet, hatching(bench, 12.0, 12.0))  # the left half
     bench.draw(sheet, [bench.stroke([[1, y], [23, y]], 3.0, "blue") for y in (3, 6, 9)])
-    blue = np.where((sheet.crayon == 2) & (np.arange(wax.LAYERS) < sheet.used[:, None]), sheet.layer, 0).sum(1)
-    left, right = blue.reshape(120, 240)[:, 20:110].mean(), blue.reshape(120, 240)[:, 130:220].mean()
+    blue = np.where(
+        (sheet.crayon == 2) & (np.arange(wax.LAYERS) < sheet.used[:, None]), sheet.layer, 0
+    ).sum(1)
+    left, right = (
+        blue.reshape(120, 240)[:, 20:110].mean(),
+        blue.reshape(120, 240)[:, 130:220].mean(),
+    )
     assert 0 < left < 0.9 * right
 
 
-# ---- resolution -------------------------------------------------------------------------------------------
+# ---- resolution ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("um", [2.0, 12.0])
@@ -428,7 +486,8 @@ def test_halving_the_step_changes_the_film_little(bench, um):
         sheet = bench.felt(120, 120)
         bench.changed(step=step).draw(sheet, hatching(bench, um, 12.0))
         films.append(sheet.total.mean())
-    # Table 1's slopes count a hundredfold, so that most faces take all wax or none, and the step matters more.
+    # Table 1's slopes count a hundredfold, so that most faces take all wax or none, and the step
+    # matters more.
     assert films[1] == pytest.approx(films[0], rel=0.15 if bench.physics.push == 0 else 0.1)
 
 
@@ -441,7 +500,11 @@ def test_the_papers_crayon_goes_cell_by_cell():
 @pytest.mark.parametrize("angle", [0, 30, 90])
 def test_a_stride_is_a_share_of_the_tip_along_its_way(angle):
     """A side of 20 mm drawn across its long axis touches 2.6 mm of the way, not 20: no ladder."""
-    for kind, width, along, breadth in (("blunt", 2.4, 2.4, 2.4), ("side", 20.0, 20.0, 2.6), ("rim", 6.0, 3.9, 6.0)):
+    for kind, width, along, breadth in (
+        ("blunt", 2.4, 2.4, 2.4),
+        ("side", 20.0, 20.0, 2.6),
+        ("rim", 6.0, 3.9, 6.0),
+    ):
         for heading, extent in ((angle, along), (angle + 90, breadth)):
             tip = Tip(kind, width, angle_deg=angle)
             strides = 48 / contacts_on_a_way(physics("metric"), tip, 48.0, heading)
@@ -452,10 +515,17 @@ def contacts_on_a_way(wax_physics, tip, length_mm, heading=0.0, cell_mm=0.1):
     """How many contacts a stroke has on a blank sheet."""
     mask = np.pad(tip_mask(tip, cell_mm, np.random.default_rng(0)), 1, constant_values=ABSENT)
     desk, n = window.window(mask.size, 1), 40
-    sheet = Sheet(np.zeros((n, n), np.float32), cell_mm, np.ones((1, 3), np.float32), np.ones((1, 3), np.float32))
+    sheet = Sheet(
+        np.zeros((n, n), np.float32),
+        cell_mm,
+        np.ones((1, 3), np.float32),
+        np.ones((1, 3), np.float32),
+    )
     constants = wax_physics.constants(cell_mm)
     table = contact.Table(False, constants, np.float32(1), n, n, sheet.columns())
-    ends = np.array([[0, 0, 1], [*(np.array(towards(heading)) * length_mm / cell_mm), 1]], np.float32)
+    ends = np.array(
+        [[0, 0, 1], [*(np.array(towards(heading)) * length_mm / cell_mm), 1]], np.float32
+    )
     held = contact.press(desk, mask.ravel(), 0, len(mask), 1, n)
     contact.stroke(desk, held, table, ends)
     return int(desk.hand[window.CONTACTS])
@@ -465,7 +535,9 @@ def test_a_side_drawn_across_its_long_axis_leaves_no_ladder(bench):
     if bench.physics.push == 0:
         pytest.skip("cell by cell there is no stride")
     sheet = bench.changed(slip=0.0).sheet(np.zeros((260, 300)))
-    bench.changed(slip=0.0).draw(sheet, [bench.stroke([[4, 13], [26, 13]], 6.0, tip=Tip("side", 20.0, 90.0))])
+    bench.changed(slip=0.0).draw(
+        sheet, [bench.stroke([[4, 13], [26, 13]], 6.0, tip=Tip("side", 20.0, 90.0))]
+    )
     along = sheet.film_um()[80:180, 80:220].mean(0)
     assert along.std() < 0.15 * along.mean()
 
@@ -473,7 +545,9 @@ def test_a_side_drawn_across_its_long_axis_leaves_no_ladder(bench):
 @pytest.mark.parametrize("um", [1.0, 4.0, 12.0])
 def test_the_film_does_not_depend_on_the_resolution(bench, um):
     if bench.physics.push == 0 and um < 8:
-        pytest.skip("Table 1 measures slopes from cell to cell, so that a light stroke depends on the cells")
+        pytest.skip(
+            "Table 1 measures slopes from cell to cell, so that a light stroke depends on the cells"
+        )
     films = []
     for cell_mm in (0.2, 0.1):
         n = round(16 / cell_mm)
@@ -488,7 +562,9 @@ def test_the_film_does_not_depend_on_the_resolution(bench, um):
 
 
 def test_wax_is_smeared_equally_far_at_any_resolution(bench):
-    """How far old wax goes on the whole, and how much of it leaves a band that a crayon without wax crosses."""
+    """How far old wax goes on the whole, and how much of it leaves a band that a crayon without wax
+    crosses.
+    """
     drift, beyond = [], []
     for cell_mm in (0.3, 0.15, 0.1, 0.05):
         n, runs = round(9 / cell_mm), []
@@ -496,7 +572,12 @@ def test_wax_is_smeared_equally_far_at_any_resolution(bench):
         on = np.abs(x - 4.5) < 0.8
         for seed in range(4):
             sheet, band = bench.felt(n, n, cell_mm, seed), np.tile(on, n)
-            sheet.total[band], sheet.used[band], sheet.layer[band, 0], sheet.crayon[band, 0] = 20, 1, 20, 2
+            sheet.total[band], sheet.used[band], sheet.layer[band, 0], sheet.crayon[band, 0] = (
+                20,
+                1,
+                20,
+                2,
+            )
             across = [bench.stroke([[1, y], [8, y]], 8.0) for y in np.arange(1, 8.1, 0.6)]
             bench.changed(rate_per_mm=0.0).draw(sheet, across)
             film = sheet.film_um()[round(2 / cell_mm) : round(7 / cell_mm)].mean(0)
@@ -513,7 +594,9 @@ def test_wax_is_smeared_equally_far_at_any_resolution(bench):
 @pytest.mark.parametrize("cell_mm", [297 / 1600, 0.0667])
 @pytest.mark.parametrize("um", [10.0, 25.0])
 def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
-    """On flat paper under a smooth tip wax comes to lie level: no grain of single cells, as a fixed share leaves."""
+    """On flat paper under a smooth tip wax comes to lie level: no grain of single cells, as a fixed
+    share leaves.
+    """
     if not bench.physics.push:
         pytest.skip("Fig. 7 as printed moves wax past the level that it seeks")
     monkeypatch.setattr("crayonize.wax.tip.BUMP_UM", 0.0)
@@ -521,9 +604,14 @@ def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
     sheet = bench.sheet(np.zeros((n, n)), cell_mm)
     bench.draw(sheet, hatching(bench, um, 14.0, 30))
     film = sheet.film_um()[n // 4 : -n // 4, n // 4 : -n // 4].astype(float)
-    fine = film - (np.roll(film, 1, 0) + np.roll(film, -1, 0) + np.roll(film, 1, 1) + np.roll(film, -1, 1)) / 4
+    fine = (
+        film
+        - (np.roll(film, 1, 0) + np.roll(film, -1, 0) + np.roll(film, 1, 1) + np.roll(film, -1, 1))
+        / 4
+    )
     fine = fine[2:-2, 2:-2]
-    assert fine.std() < (0.075 if um == 10 else 0.065) * film.mean()  # .092 under heavy force if nothing yields
+    # .092 under heavy force if nothing yields
+    assert fine.std() < (0.075 if um == 10 else 0.065) * film.mean()
 
 
 def test_nothing_is_pressed_harder_than_wax_bears(bench):
@@ -533,19 +621,26 @@ def test_nothing_is_pressed_harder_than_wax_bears(bench):
     films = []
     for times in (1.3, 13.0):
         sheet = bench.felt(60, 120)
-        bench.draw(sheet, [bench.stroke([[1, 3], [11, 3]], times * bench.physics.bears / bench.physics.lam)])
+        bench.draw(
+            sheet,
+            [bench.stroke([[1, 3], [11, 3]], times * bench.physics.bears / bench.physics.lam)],
+        )
         films.append(sheet.total.copy())
     np.testing.assert_array_equal(*films)
 
 
 def test_a_crayon_slips_along_its_stroke(bench):
-    """Film along a stroke on flat paper comes and goes over about a millimetre, and not where slip is 0."""
+    """Film along a stroke on flat paper comes and goes over about a millimetre, and not where slip
+    is 0.
+    """
     if not bench.physics.slip:
         pytest.skip("the paper's crayon follows the hand")
     waves = []
     for slip in (0.0, bench.physics.slip):
         sheet = bench.sheet(np.zeros((30, 400)))
-        bench.changed(slip=slip, wear=0.0).draw(sheet, [bench.stroke([[1, 1.5], [39, 1.5]], 6.0)], smears=False)
+        bench.changed(slip=slip, wear=0.0).draw(
+            sheet, [bench.stroke([[1, 1.5], [39, 1.5]], 6.0)], smears=False
+        )
         along = sheet.film_um()[10:20, 30:370].mean(0)
         waves.append(along.std() / along.mean())
     assert waves[0] < 0.05 and 0.05 < waves[1] < 0.3
@@ -557,7 +652,9 @@ def test_a_long_stroke_has_no_rhythm(bench):
     bench.draw(sheet, [bench.stroke([[2, y], [118, y]], 8.0) for y in ways], threads=2)
     film = sheet.film_um()[:, round(5 / cell_mm) : round(115 / cell_mm)].reshape(sheet.rows, -1)
     lines = [film[round((y - 0.6) / cell_mm) : round((y + 0.6) / cell_mm)].mean(0) for y in ways]
-    power = sum(np.abs(np.fft.rfft((line - line.mean()) * np.hanning(line.size))) ** 2 for line in lines)
+    power = sum(
+        np.abs(np.fft.rfft((line - line.mean()) * np.hanning(line.size))) ** 2 for line in lines
+    )
     stride = bench.physics.step * 1.6
     if not stride:
         pytest.skip("cell by cell there is no rhythm")
@@ -574,7 +671,7 @@ def test_a_dab_gives_the_same_volume_at_any_resolution(bench):
     assert np.ptp(volumes) < 0.15 * np.mean(volumes)
 
 
-# ---- wear -------------------------------------------------------------------------------------------------
+# ---- wear ----------------------------------------------------------------------------------------
 
 
 def test_a_long_stroke_flattens_a_sharp_tip(bench):
@@ -582,7 +679,9 @@ def test_a_long_stroke_flattens_a_sharp_tip(bench):
     widths = []
     for wear in (0.0, 0.5):
         sheet = bench.sheet(np.zeros((40, 400)))
-        bench.changed(wear=wear).draw(sheet, [bench.stroke([[2, 2], [38, 2]], 2.0, tip=tip)], smears=False)
+        bench.changed(wear=wear).draw(
+            sheet, [bench.stroke([[2, 2], [38, 2]], 2.0, tip=tip)], smears=False
+        )
         touched = (sheet.film_um() > 0).sum(0)
         widths.append((touched[40:60].mean(), touched[340:360].mean()))
     (fresh_start, fresh_end), (worn_start, worn_end) = widths
@@ -593,14 +692,18 @@ def test_a_long_stroke_flattens_a_sharp_tip(bench):
 def test_wear_goes_on_from_stroke_to_stroke(bench):
     box, shape = Box(bench.palette, bench.physics, 0.1), Tip("sharp", 2.4)
     stroke = bench.stroke([[2, 2], [30, 2]], 5.0, tip=shape)
-    per_stroke = flat_um(shape) / 10 * shape.area_mm2 / bench.physics.worn_per_newton_mm()  # newton mm
+    # newton mm
+    per_stroke = flat_um(shape) / 10 * shape.area_mm2 / bench.physics.worn_per_newton_mm()
     once, ahead = np.array([per_stroke * 1.001]), np.array([0])
     taken = np.array([box.take([stroke], once, ahead) for _ in range(20)])[:, 0]
     at_once = Box(bench.palette, bench.physics, 0.1)
-    np.testing.assert_array_equal(at_once.take([stroke] * 20, once.repeat(20), ahead.repeat(20)), taken)
+    np.testing.assert_array_equal(
+        at_once.take([stroke] * 20, once.repeat(20), ahead.repeat(20)), taken
+    )
     assert at_once.worn_um == box.worn_um
     flat = [int((box.masks[n] < 8).sum()) for n in taken]
-    assert (np.diff(flat[:10]) >= 0).all() and len(set(taken[:10])) == WEAR_LEVELS  # flatter and flatter
+    # flatter and flatter
+    assert (np.diff(flat[:10]) >= 0).all() and len(set(taken[:10])) == WEAR_LEVELS
     assert flat[9] > 1.5 * flat[0] and flat[10] < flat[9]  # then turned to a fresh face
     assert set(taken[:10]).isdisjoint(taken[10:]) and box.sharpened["red"] == 2
     other = bench.stroke([[2, 2], [30, 2]], 5.0, "blue", shape)
@@ -610,9 +713,14 @@ def test_wear_goes_on_from_stroke_to_stroke(bench):
 
 
 def test_a_long_line_broadens_alike_as_one_stroke_and_as_many(bench):
-    """Until the tip is worn flat: then the plan has it turned, which nobody does within a stroke."""
+    """Until the tip is worn flat: then the plan has it turned, which nobody does within a
+    stroke.
+    """
     if bench.physics.push == 0:
-        pytest.skip("Table 1 wears a tip by all that it gives, which its plan of usual means does not foresee")
+        pytest.skip(
+            "Table 1 wears a tip by all that it gives, which its plan of usual means does not "
+            "foresee"
+        )
     shape, force = Tip("sharp", 4.0), 1.0
     length = 0.97 * flat_um(shape) * shape.area_mm2 / bench.physics.worn_per_newton_mm() / force
     broad = []
@@ -620,12 +728,17 @@ def test_a_long_line_broadens_alike_as_one_stroke_and_as_many(bench):
         ends = np.linspace(3, 3 + length, pieces + 1)
         sheet = bench.sheet(np.zeros((60, round((length + 6) / 0.1))))
         um = force / (bench.physics.lam * np.pi / 4 * 16)
-        strokes = [bench.stroke([[a, 3], [b, 3]], um, tip=shape) for a, b in itertools.pairwise(ends)]
+        strokes = [
+            bench.stroke([[a, 3], [b, 3]], um, tip=shape) for a, b in itertools.pairwise(ends)
+        ]
         bench.draw(sheet, strokes, smears=False)
         breadth = []
         for share in (0.05, 0.6):
             begin = round((3 + share * length) / 0.1)
-            film, across = sheet.film_um()[:, begin : begin + round(length)].mean(1), 0.1 * np.arange(60)
+            film, across = (
+                sheet.film_um()[:, begin : begin + round(length)].mean(1),
+                0.1 * np.arange(60),
+            )
             mean = (film * across).sum() / film.sum()
             breadth.append(4 * np.sqrt((film * (across - mean) ** 2).sum() / film.sum()))
         assert breadth[1] > 1.2 * breadth[0]
@@ -638,7 +751,9 @@ def test_wear_is_planned_by_force_times_the_length_drawn(bench, kind, width):
     """... over the area of the tip: a side of 8 mm has 21 mm2, not the 50 of a disc."""
     shape = Tip(kind, width)
     box, sheet = Box(bench.palette, bench.physics, 0.1), bench.sheet(np.zeros((120, 120)))
-    strokes = [bench.stroke(p, 2.0, tip=shape) for p in ([[1, 1], [5, 1], [5, 3]], [[11, 11], [7, 11]])]
+    strokes = [
+        bench.stroke(p, 2.0, tip=shape) for p in ([[1, 1], [5, 1], [5, 3]], [[11, 11], [7, 11]])
+    ]
     rub.rub(sheet, strokes, box)
     newton_mm = 10 * float(strokes[0].force_n[0])
     area = {"blunt": np.pi / 4 * 1.6**2, "side": 8 * 2.6, "rim": shape.area_mm2}[kind]
@@ -659,7 +774,9 @@ def test_a_crayon_draws_the_same_by_any_name(bench):
     """The face of its tip goes by its place in the box."""
     seen = []
     for name in ("red", "a much longer name"):
-        crayons = tuple(replace(c, name=name) if c.name == "red" else c for c in bench.palette.crayons)
+        crayons = tuple(
+            replace(c, name=name) if c.name == "red" else c for c in bench.palette.crayons
+        )
         box = Box(replace(bench.palette, crayons=crayons), bench.physics, 0.1)
         sheet = bench.felt(60, 80)
         rub.rub(sheet, [bench.stroke([[1, 3], [7, 3]], 5.0, name)], box)
@@ -677,11 +794,13 @@ def test_tips_come_from_the_seed(bench):
     assert np.abs(masks[0] - masks[2])[masks[0] < ABSENT].max() > 1
 
 
-# ---- threads ----------------------------------------------------------------------------------------------
+# ---- threads -------------------------------------------------------------------------------------
 
 
 def wax_bytes(sheet):
-    return b"".join(a.tobytes() for a in (sheet.total, sheet.used, sheet.crayon, sheet.layer, sheet.blend))
+    return b"".join(
+        a.tobytes() for a in (sheet.total, sheet.used, sheet.crayon, sheet.layer, sheet.blend)
+    )
 
 
 def test_any_number_of_threads_gives_the_same_bytes(bench):
@@ -712,25 +831,34 @@ def test_an_unknown_physics_is_named():
         physics("oil")
 
 
-# ---- media --------------------------------------------------------------------------------------------------
+# ---- media ---------------------------------------------------------------------------------------
 
 
 def test_media_differ_as_they_do_on_paper(crayons):
-    """Oil pastel gives most and reaches farthest, a pencil least; both show more colour in as much wax."""
+    """Oil pastel gives most and reaches farthest, a pencil least; both show more colour in as much
+    wax.
+    """
     films, drifts = {}, {}
     for name in ("pencil", "metric", "oil-pastel"):
         bench = Bench(physics(name), crayons)
         sheet = bench.felt(100, 160)
-        bench.draw(sheet, [bench.stroke([[1, y], [15, y]], 8.0 * 0.05 / bench.physics.lam) for y in range(2, 9)])
+        bench.draw(
+            sheet,
+            [bench.stroke([[1, y], [15, y]], 8.0 * 0.05 / bench.physics.lam) for y in range(2, 9)],
+        )
         films[name] = sheet.total.mean()
         band = np.tile(np.abs(np.arange(160) - 80) < 8, 100)
         old = bench.felt(100, 160)
         old.total[band], old.used[band], old.layer[band, 0], old.crayon[band, 0] = 20, 1, 20, 2
-        bench.changed(rate_per_mm=0.0).draw(old, [bench.stroke([[1, y], [15, y]], 8.0) for y in range(1, 10)])
+        bench.changed(rate_per_mm=0.0).draw(
+            old, [bench.stroke([[1, y], [15, y]], 8.0) for y in range(1, 10)]
+        )
         drifts[name] = (old.film_um().mean(0) * np.arange(160)).sum() / old.film_um().mean(0).sum()
     assert films["pencil"] < 0.4 * films["metric"] < 0.4 * films["oil-pastel"] / 1.5
     assert drifts["pencil"] < drifts["metric"] < drifts["oil-pastel"]
-    assert physics("pencil").pigment > physics("oil-pastel").pigment > physics("metric").pigment == 1
+    assert (
+        physics("pencil").pigment > physics("oil-pastel").pigment > physics("metric").pigment == 1
+    )
 
 
 def test_pigment_colours_the_wax_of_the_same_palette(bench):

@@ -1,9 +1,10 @@
 """The stroke generator's table of crayons, measured on the simulator itself.
 
-Every crayon is hatched at six pressures over four grounds (bare paper, and coats of the lightest, a middle and the
-darkest crayon); a line per channel through "before, after" gives `a` and `b` of the table. The tables of
-the shipped palettes on the default paper are part of the package (`python -m crayonize.crayons.calibration` measures
-them anew); others are measured once and kept in the user's cache folder.
+Every crayon is hatched at six pressures over four grounds (bare paper, and coats of the lightest, a
+middle and the darkest crayon); a line per channel through "before, after" gives `a` and `b` of the
+table. The tables of the shipped palettes on the default paper are part of the package (`python -m
+crayonize.crayons.calibration` measures them anew); others are measured once and kept in the user's
+cache folder.
 """
 
 import hashlib
@@ -65,7 +66,9 @@ def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: i
     grain = grain.reshape(split[:3])[0].T
     names = tuple(c.name for c in crayons)
     paper_colour = np.array(base, np.float32)
-    return Swatches(names, np.array(PRESSURES, np.float32), a, b, np.ascontiguousarray(grain), paper_colour)
+    return Swatches(
+        names, np.array(PRESSURES, np.float32), a, b, np.ascontiguousarray(grain), paper_colour
+    )
 
 
 def _grounds(palette: Palette) -> list[tuple[str, float] | None]:
@@ -89,7 +92,9 @@ def _hatching(row: int, col: int, crayon: str, pressure: float, turn: int) -> St
     return Stroke(path, force, crayon, TIP)
 
 
-def _means(picture: NDArray[np.float32], rows: int, cols: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _means(
+    picture: NDArray[np.float32], rows: int, cols: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Mean linear colour (rows, cols, 3) and grain (rows, cols) of the swatches."""
     from stroke_gen.colour import oklab
 
@@ -99,16 +104,22 @@ def _means(picture: NDArray[np.float32], rows: int, cols: int) -> tuple[NDArray[
         for col in range(cols):
             y0, x0 = row * PATCH_MM + EDGE_MM, col * PATCH_MM + EDGE_MM
             y1, x1 = y0 + PATCH_MM - 2 * EDGE_MM, x0 + PATCH_MM - 2 * EDGE_MM
-            part = picture[round(y0 / CELL_MM) : round(y1 / CELL_MM), round(x0 / CELL_MM) : round(x1 / CELL_MM)]
+            part = picture[
+                round(y0 / CELL_MM) : round(y1 / CELL_MM), round(x0 / CELL_MM) : round(x1 / CELL_MM)
+            ]
             mean[row, col] = part.mean((0, 1))
             grain[row, col] = oklab(part)[..., 0].std()
     return mean, grain
 
 
-def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Lines after = a * before + b per crayon, pressure and channel, from (grounds, p, k, 3): (2, k, p, 3) each.
+def _fit(
+    before: NDArray[np.float32], after: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Lines after = a * before + b per crayon, pressure and channel, from (grounds, p, k, 3): (2,
+    k, p, 3) each.
 
-    The first goes exactly through what bare paper gave, the second through the means of the waxed grounds.
+    The first goes exactly through what bare paper gave, the second through the means of the waxed
+    grounds.
     """
     x, y = before[1:], after[1:]
     lines = []
@@ -121,9 +132,11 @@ def _fit(before: NDArray[np.float32], after: NDArray[np.float32]) -> tuple[NDArr
 
 
 def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
-    """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured now.
+    """The table for a palette, paper and physics: shipped, kept from an earlier run, or measured
+    now.
 
-    A kept one counts for the version of the wax that it was measured on; a shipped one is of its own version.
+    A kept one counts for the version of the wax that it was measured on; a shipped one is of its
+    own version.
     """
     name = f"{palette.name}-{_key(palette, sheet_paper, physics)}.npz"
     if (SHIPPED / name).is_file():
@@ -138,7 +151,9 @@ def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: 
 
 def _key(palette: Palette, sheet_paper: paper.Paper, physics: str) -> str:
     """Changes with whatever the measured colours depend on."""
-    what = repr((palette.crayons, sheet_paper, physics_of(physics), PRESSURES, TIP, SPACING, CELL_MM))
+    what = repr(
+        (palette.crayons, sheet_paper, physics_of(physics), PRESSURES, TIP, SPACING, CELL_MM)
+    )
     return hashlib.sha256(what.encode()).hexdigest()[:12]
 
 
@@ -146,14 +161,18 @@ def _packed(table: Swatches) -> bytes:
     content = io.BytesIO()
     a, b, grain = (m.astype(np.float16) for m in (table.a, table.b, table.grain))
     names = np.array(table.names)
-    np.savez(content, names=names, pressures=table.pressures, paper=table.paper, a=a, b=b, grain=grain)
+    np.savez(
+        content, names=names, pressures=table.pressures, paper=table.paper, a=a, b=b, grain=grain
+    )
     return content.getvalue()
 
 
 def _unpacked(content: bytes) -> Swatches:
     with np.load(io.BytesIO(content)) as table:
         names = tuple(str(n) for n in table["names"])
-        return Swatches(names, *(table[f].astype(np.float32) for f in ("pressures", "a", "b", "grain", "paper")))
+        return Swatches(
+            names, *(table[f].astype(np.float32) for f in ("pressures", "a", "b", "grain", "paper"))
+        )
 
 
 def ship(target: Path = SHIPPED) -> None:
@@ -162,7 +181,11 @@ def ship(target: Path = SHIPPED) -> None:
     for old in target.glob("*.npz"):
         old.unlink()
     for name, *_ in palette_names():
-        box, sheet_paper, physics = load_palette(name), paper.load_paper(str(Settings.paper)), Settings.physics
+        box, sheet_paper, physics = (
+            load_palette(name),
+            paper.load_paper(str(Settings.paper)),
+            Settings.physics,
+        )
         table = _packed(measure(box, sheet_paper, physics, cores.allowed()))
         (target / f"{name}-{_key(box, sheet_paper, physics)}.npz").write_bytes(table)
 

@@ -1,8 +1,8 @@
 """Light through wax: Kubelka-Munk over the layers, bottom up, in linear light (section 4, Fig. 9).
 
-Fig. 9 is read as Kubelka's two-layer formula (1954) on the reflectance r and transmittance t of each
-layer, which follow from the sums k*h and s*h (Kubelka 1948). Splitting a layer changes nothing.
-A quiet light from the upper left shades the relief of paper and wax.
+Fig. 9 is read as Kubelka's two-layer formula (1954) on the reflectance r and transmittance t of
+each layer, which follow from the sums k*h and s*h (Kubelka 1948). Splitting a layer changes
+nothing. A quiet light from the upper left shades the relief of paper and wax.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,13 +26,16 @@ T = TypeVar("T")
 
 LIGHT = 0.007  # change of brightness per 1/100 of slope, before saturation: 3 to 6 % over a drawing
 FILM_UM = 0.5  # a film so thin has half of its front surface: the rest is in gaps
-GLOSS = 6.0  # how much more the relief shows in what the surface reflects than in what comes through it
+# how much more the relief shows in what the surface reflects than in what comes through it
+GLOSS = 6.0
 BAND = 1 << 17  # cells rendered by one task
 
 
 @kernel
 def _over(ground, kh, sh):  # type: ignore[no-untyped-def]
-    """Reflectance of a layer with absorption kh and scattering sh over a ground; stable for kh, sh -> 0."""
+    """Reflectance of a layer with absorption kh and scattering sh over a ground; stable for kh, sh
+    -> 0.
+    """
     one, two = np.float32(1), np.float32(2)
     g = np.sqrt(kh * (kh + two * sh))
     if g < np.float32(1e-3):
@@ -42,7 +45,8 @@ def _over(ground, kh, sh):  # type: ignore[no-untyped-def]
         e2 = e * e
         m = one - e2
         a, b, d = sh * m, two * g * e, (kh + sh) * m + g * (one + e2)
-    left = d - a * ground  # r = a / d, t = b / d, and r + t t ground / (1 - r ground) in one fraction
+    # r = a / d, t = b / d, and r + t t ground / (1 - r ground) in one fraction
+    left = d - a * ground
     return (a * left + b * b * ground) / (d * left)
 
 
@@ -79,13 +83,17 @@ def _render(top, bottom, left, right, ground, lamp, columns, cols, first, out): 
                 h = columns.layer[cell * LAYERS + j]
                 wax = np.int64(columns.crayon[cell * LAYERS + j]) * 6
                 for c in range(3):
-                    out[row, x, c] = _over(out[row, x, c], h * optics[wax + c], h * optics[wax + 3 + c])
+                    out[row, x, c] = _over(
+                        out[row, x, c], h * optics[wax + c], h * optics[wax + 3 + c]
+                    )
             # The relief under a lamp from the upper left.
             shade = np.float32(0)
             if lamp.slope > 0:
                 before = cell - (cols if y > 0 else 0) - (1 if x > 0 else 0)
                 after = cell + (cols if y < rows - 1 else 0) + (1 if x < cols - 1 else 0)
-                rise = (paper[after] - paper[before]) * np.float32(0.35) + total[after] - total[before]
+                rise = (
+                    (paper[after] - paper[before]) * np.float32(0.35) + total[after] - total[before]
+                )
                 shade = rise * lamp.slope
                 shade /= one + abs(shade) * np.float32(12)
             # What the front surface reflects never went through the wax.
@@ -105,7 +113,9 @@ def _render_parts(parts, ground, lamp, columns, cols, first, out):  # type: igno
 
 
 def render(sheet: Sheet, ground: Colour, *, light: bool = True, threads: int = 1) -> Floats:
-    """The picture of a sheet: linear RGB (rows, cols, 3) over paper of the linear colour `ground`."""
+    """The picture of a sheet: linear RGB (rows, cols, 3) over paper of the linear colour
+    `ground`.
+    """
     out = np.empty((sheet.rows, sheet.cols, 3), np.float32)
 
     def band(top: int, bottom: int) -> None:
@@ -116,7 +126,9 @@ def render(sheet: Sheet, ground: Colour, *, light: bool = True, threads: int = 1
     return out
 
 
-def render_srgb(sheet: Sheet, ground: Colour, *, light: bool = True, threads: int = 1) -> NDArray[np.uint8]:
+def render_srgb(
+    sheet: Sheet, ground: Colour, *, light: bool = True, threads: int = 1
+) -> NDArray[np.uint8]:
     """As `render`, in sRGB of 8 bits. Only a band of it exists as floats at any time."""
     out = np.empty((sheet.rows, sheet.cols, 3), np.uint8)
 
@@ -128,8 +140,12 @@ def render_srgb(sheet: Sheet, ground: Colour, *, light: bool = True, threads: in
     return out
 
 
-def render_reduced(sheet: Sheet, ground: Colour, shape: tuple[int, int], *, threads: int = 1) -> Floats:
-    """As `render` without light, on a grid of `shape` no finer than the sheet: area means, linear RGB (*shape, 3)."""
+def render_reduced(
+    sheet: Sheet, ground: Colour, shape: tuple[int, int], *, threads: int = 1
+) -> Floats:
+    """As `render` without light, on a grid of `shape` no finer than the sheet: area means, linear
+    RGB (*shape, 3).
+    """
     out = np.zeros((*shape, 3), np.float32)
 
     def band(top: int, bottom: int) -> Floats:
@@ -141,24 +157,40 @@ def render_reduced(sheet: Sheet, ground: Colour, shape: tuple[int, int], *, thre
 
 
 def _by_bands(sheet: Sheet, work: Callable[[int, int], T], threads: int) -> Iterator[tuple[int, T]]:
-    """What `work` makes of rows top..bottom, on threads: (top, that) for one band after the other."""
+    """What `work` makes of rows top..bottom, on threads: (top, that) for one band after the
+    other.
+    """
     step = max(1, BAND // sheet.cols)
     tops = range(0, sheet.rows, step)
     with ThreadPoolExecutor(threads) as pool:
-        yield from zip(tops, pool.map(lambda top: work(top, min(top + step, sheet.rows)), tops), strict=True)
+        yield from zip(
+            tops, pool.map(lambda top: work(top, min(top + step, sheet.rows)), tops), strict=True
+        )
 
 
 def _band(sheet: Sheet, ground: Colour, top: int, bottom: int, light: bool) -> Floats:
     """Rows top..bottom of the picture."""
     out = np.empty((bottom - top, sheet.cols, 3), np.float32)
-    render_parts(sheet, ground, np.array([[top, bottom, 0, sheet.cols]]), out, first=top, light=light)
+    render_parts(
+        sheet, ground, np.array([[top, bottom, 0, sheet.cols]]), out, first=top, light=light
+    )
     return out
 
 
 def render_parts(
-    sheet: Sheet, ground: Colour, parts: NDArray[np.int64], out: Floats, *, first: int = 0, light: bool = True
+    sheet: Sheet,
+    ground: Colour,
+    parts: NDArray[np.int64],
+    out: Floats,
+    *,
+    first: int = 0,
+    light: bool = True,
 ) -> None:
-    """Renew parts (n, 4), each top, bottom, left, right in cells, of a picture `out` that begins at row `first`."""
+    """Renew parts (n, 4), each top, bottom, left, right in cells, of a picture `out` that begins at
+    row `first`.
+    """
     slope = LIGHT * 0.1 / sheet.cell_mm * 0.5 if light else 0.0
     lamp = Lamp(*(np.float32(value) for value in (slope, FRONT, FILM_UM, GLOSS)))
-    _render_parts(parts, np.array(ground, np.float32), lamp, sheet.columns(), sheet.cols, first, out)
+    _render_parts(
+        parts, np.array(ground, np.float32), lamp, sheet.columns(), sheet.cols, first, out
+    )

@@ -32,7 +32,6 @@ FEW = 0.01  # of all wax: crayons that give less come together at the end
 SOLID_UM = 3.0
 
 
-
 def save_steps(
     drawing: Drawing, out: str | os.PathLike[str], progress: Progress | None = None
 ) -> list[Path]:

@@ -1,8 +1,10 @@
-"""The box of crayons in hand: how far each tip is worn, which face of it touches, how much wax it gave.
+"""The box of crayons in hand: how far each tip is worn, which face of it touches, how much wax it
+gave.
 
-Wear carries on within a stroke cell by cell. From stroke to stroke it carries on as a plan: the volume that a
-stroke rubs off follows from its force and length (rate * force / lambda), so each stroke's tip is known before
-any is drawn, and strokes on different tiles can be drawn side by side. A drawing says how wide its tips are,
+Wear carries on within a stroke cell by cell. From stroke to stroke it carries on as a plan: the
+volume that a stroke rubs off follows from its force and length (rate * force / lambda), so each
+stroke's tip is known before any is drawn, and strokes on different tiles can be drawn side by side.
+A drawing says how wide its tips are,
 so one worn flat to its full width is turned or sharpened: the next stroke gets a fresh face.
 """
 
@@ -31,7 +33,8 @@ class Box:
         self.reach = constants.reach(cell_mm)
         self.worn_um: dict[tuple[str, Tip], float] = {}  # mean height lost since the drawing began
         self.given_mm3: dict[str, float] = {}
-        self.sharpened: Counter[str] = Counter()  # by crayon: how often a tip was turned or sharpened
+        # by crayon: how often a tip was turned or sharpened
+        self.sharpened: Counter[str] = Counter()
         self.masks: list[NDArray[np.float32]] = []
         self._index: dict[tuple[Tip, int, int, int], int] = {}
 
@@ -42,12 +45,11 @@ class Box:
         return k, np.array([c.s for c in crayons], np.float32) * pigment
 
     def take(
-        self,
-        strokes: Sequence[Stroke],
-        newton_mm: NDArray[np.float64],
-        heading: NDArray[np.int64],
+        self, strokes: Sequence[Stroke], newton_mm: NDArray[np.float64], heading: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Which of `masks` draws each stroke along one of HEADINGS; wear goes on by force times length."""
+        """Which of `masks` draws each stroke along one of HEADINGS; wear goes on by force times
+        length.
+        """
         taken = np.empty(len(strokes), np.int64)
         mine_of: dict[tuple[str, Tip], list[int]] = {}
         for i, stroke in enumerate(strokes):

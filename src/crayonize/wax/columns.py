@@ -1,8 +1,8 @@
 """The wax on each cell: pure layers over a blend, and how more of it is laid on.
 
-A column holds up to LAYERS layers of pure crayons, top last, over one blend of all that has sunk. Optical
-properties travel as a crayon's number (pure layers) or as sums of k*h and s*h (the blend): both are linear
-in height, so wax can be split, moved and merged and no pigment is lost.
+A column holds up to LAYERS layers of pure crayons, top last, over one blend of all that has sunk.
+Optical properties travel as a crayon's number (pure layers) or as sums of k*h and s*h (the blend):
+both are linear in height, so wax can be split, moved and merged and no pigment is lost.
 """
 
 from typing import NamedTuple
@@ -40,8 +40,9 @@ def whole(number):  # type: ignore[no-untyped-def]
 def add(cell, wax, height, thin, columns):  # type: ignore[no-untyped-def]
     """Lay `height` um of pure crayon `wax` on a column.
 
-    Films thinner than `thin` um are dust: they do not part two layers of one crayon, and when a column is full the
-    thinnest of them sinks into the blend (section 3.1: "thin layers are blended"). Without dust the lowest sinks.
+    Films thinner than `thin` um are dust: they do not part two layers of one crayon, and when a
+    column is full the thinnest of them sinks into the blend (section 3.1: "thin layers are
+    blended"). Without dust the lowest sinks.
     """
     used, crayon, layer = columns.used, columns.crayon, columns.layer
     columns.total[cell] += height

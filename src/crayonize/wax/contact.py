@@ -1,4 +1,5 @@
-"""A stroke, contact after contact: what happens on the sheet under a crayon that is drawn along (Fig. 3).
+"""A stroke, contact after contact: what happens on the sheet under a crayon that is drawn along
+(Fig. 3).
 
 Kernels here get all memory from outside (`window`) and know nothing of other strokes.
 """
@@ -29,9 +30,12 @@ from .window import (
     look,
 )
 
-DAB = np.float32(0.04)  # how far a dab slides, in extents of its tip: the least that leaves a mark in every tooth
-ACCURACY = np.float32(0.01)  # of the force, where that is finer than epsilon: light touches must not be rounded off
-TURN_X, TURN_Y = 0.7548776662, 0.5698402910  # powers of 1 / 1.3247 (Roberts' R2): offsets that fill a cell evenly
+# how far a dab slides, in extents of its tip: the least that leaves a mark in every tooth
+DAB = np.float32(0.04)
+# of the force, where that is finer than epsilon: light touches must not be rounded off
+ACCURACY = np.float32(0.01)
+# powers of 1 / 1.3247 (Roberts' R2): offsets that fill a cell evenly
+TURN_X, TURN_Y = 0.7548776662, 0.5698402910
 
 
 class Table(NamedTuple):
@@ -56,7 +60,9 @@ class Held(NamedTuple):
 
 @lean_kernel
 def press(w, mask, wax, side, reach, cols):  # type: ignore[no-untyped-def]
-    """Put a tip on a sheet `cols` cells wide: the beginning of a stroke; returns the crayon as it is held."""
+    """Put a tip on a sheet `cols` cells wide: the beginning of a stroke; returns the crayon as it
+    is held.
+    """
     present, mx, my, xx, xy, yy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(side):
         for i in range(side):
@@ -78,8 +84,12 @@ def press(w, mask, wax, side, reach, cols):  # type: ignore[no-untyped-def]
 
 @inner_kernel
 def _extent(w, vx, vy):  # type: ignore[no-untyped-def]
-    """How long the tip is along its way, in cells: four standard deviations, which is a disc's diameter."""
-    spread = vx * vx * w.hand[SPREAD_XX] + 2 * vx * vy * w.hand[SPREAD_XY] + vy * vy * w.hand[SPREAD_YY]
+    """How long the tip is along its way, in cells: four standard deviations, which is a disc's
+    diameter.
+    """
+    spread = (
+        vx * vx * w.hand[SPREAD_XX] + 2 * vx * vy * w.hand[SPREAD_XY] + vy * vy * w.hand[SPREAD_YY]
+    )
     return np.float32(max(1.0, 4 * np.sqrt(max(spread, 0.0))))
 
 
@@ -95,7 +105,8 @@ def _luck(number):  # type: ignore[no-untyped-def]
 def _hop(contact, mean, scatter):  # type: ignore[no-untyped-def]
     """How many cells smeared wax goes at a contact: `mean`, by chance up to `scatter` more or less.
 
-    Wax that always went equally far would part the cells into lattices; a pattern would show as a ladder.
+    Wax that always went equally far would part the cells into lattices; a pattern would show as a
+    ladder.
     """
     chance = scatter * (np.float32(2) * _luck(contact) - np.float32(1))
     return max(1, int(np.floor(mean + np.float32(0.5) + chance)))
@@ -103,7 +114,8 @@ def _hop(contact, mean, scatter):  # type: ignore[no-untyped-def]
 
 @inner_kernel
 def _grip(own, along):  # type: ignore[no-untyped-def]
-    """How much harder (to 1) or lighter (to -1) the crayon presses than the hand, as it sticks and slips.
+    """How much harder (to 1) or lighter (to -1) the crayon presses than the hand, as it sticks and
+    slips.
 
     along: the way so far, in lengths over which that changes.   own: differs from stroke to stroke.
     """
@@ -115,7 +127,9 @@ def _grip(own, along):  # type: ignore[no-untyped-def]
 
 @lean_kernel
 def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyped-def]
-    """One contact, for `stride` cells of the way: adjust the height, smear, deposit; returns the wax given."""
+    """One contact, for `stride` cells of the way: adjust the height, smear, deposit; returns the
+    wax given.
+    """
     one, c, side = np.float32(1), table.constants, held.side
     contact = np.int64(w.hand[CONTACTS])
     w.hand[CONTACTS] += 1
@@ -140,7 +154,9 @@ def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyp
     grip = one + c.slip * _grip(np.int64(w.hand[OWN]), contact * stride / c.slip_cells)
     wanted = min(force * grip * table.per_lambda, c.most * held.present) * inside
     cells = side * side
-    h = balance(w.over[:cells], wanted, np.float32(w.hand[HEIGHT]), min(c.epsilon, ACCURACY * wanted))
+    h = balance(
+        w.over[:cells], wanted, np.float32(w.hand[HEIGHT]), min(c.epsilon, ACCURACY * wanted)
+    )
     w.hand[HEIGHT] = h
     overlap(w.over[:cells], h)
 
@@ -161,7 +177,8 @@ def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyp
 def move(w, held, table, a, b):  # type: ignore[no-untyped-def]
     """Draw on from point a to point b, each x, y in cells and force in N; returns the wax given.
 
-    There is a contact every so many cells: a share `step` of the tip's extent along the way, at least one.
+    There is a contact every so many cells: a share `step` of the tip's extent along the way, at
+        least one.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     length = np.hypot(dx, dy)
@@ -182,7 +199,10 @@ def move(w, held, table, a, b):  # type: ignore[no-untyped-def]
 
 @lean_kernel
 def lift(w, held, table, b):  # type: ignore[no-untyped-def]
-    """End a stroke at point b; one so short that nothing touched becomes a dab. Returns the wax given."""
+    """End a stroke at point b; one so short that nothing touched becomes a dab.
+
+    Returns the wax given.
+    """
     if w.hand[CONTACTS] > 0:
         return 0.0
     across = np.float32(1)

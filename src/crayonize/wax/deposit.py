@@ -49,36 +49,22 @@ def deposit(w, side, reach, vx, vy, push, stride, c):  # type: ignore[no-untyped
 
 
 @inner_kernel
-def _break_off(  # type: ignore[no-untyped-def]
-    here,
-    ahead,
-    aside,
-    film,
-    film_ahead,
-    film_aside,
-    slant,
-    over,
-    before,
-    push,
-    rate,
-    thick,
-    mu_paper,
-    mu_wax,
-    relief,
-    heap,
-    firm,
-    broken,
-):
-    """What breaks off each cell: rate * mu * sin(S, F) of the room, where S is the surface and F the force.
+def _break_off(here, ahead, aside, film, film_ahead, film_aside,  # type: ignore[no-untyped-def]
+               slant, over, before, push, rate, thick, mu_paper, mu_wax, relief, heap, firm,
+               broken):  # fmt: skip
+    """What breaks off each cell: rate * mu * sin(S, F) of the room, where S is the surface and F
+    the force.
 
-    Loops over arrays of the same length; P' lies between `ahead` and `aside`, `slant` of the way to the latter.
+    Loops over arrays of the same length; P' lies between `ahead` and `aside`, `slant` of the way to
+    the latter.
     """
     one = np.float32(1)
     straight = one - slant
     length2 = one + slant * slant  # of the way to P'
     press, push = one / np.sqrt(one + push * push), push * np.sqrt(length2)
     for i in range(broken.size):
-        # Room: by how much the tip is below the surface after smearing, less what is out of its reach.
+        # Room: by how much the tip is below the surface after smearing, less what is out of its
+        # reach.
         room = over[i] + firm * (film[i] - before[i]) - heap * film[i]
 
         # Sine between the surface and the force, the angle addition of Eq. 3 without angles.
@@ -97,7 +83,9 @@ def _break_off(  # type: ignore[no-untyped-def]
 
 @lean_sum_kernel
 def _wear(broken, wear, inflow, mask):  # type: ignore[no-untyped-def]
-    """Make what broke off ready to be laid, and deepen the mask by `wear` of it; returns its sum."""
+    """Make what broke off ready to be laid, and deepen the mask by `wear` of it; returns its
+    sum.
+    """
     lost = np.float32(0)
     for i in range(broken.size):
         inflow[i] += broken[i]

@@ -1,9 +1,11 @@
-"""Drawing by hand: a crayon on an open sheet, segment by segment, and what of the picture each one changes.
+"""Drawing by hand: a crayon on an open sheet, segment by segment, and what of the picture each one
+changes.
 
-The kernels are those of `rub`, and so is the wax: strokes drawn here, saved, and drawn again come out the same.
-One thing `rub` knows that a hand does not tell when it puts the crayon down: which way the whole stroke goes,
-along which the tip's grooves lie (`box.HEADINGS`). So the first half millimetre is waited for, and its way is
-taken. A stroke that bends later on may have its grooves turned a little when it is drawn again.
+The kernels are those of `rub`, and so is the wax: strokes drawn here, saved, and drawn again come
+out the same. One thing `rub` knows that a hand does not tell when it puts the crayon down: which
+way the whole stroke goes, along which the tip's grooves lie (`box.HEADINGS`). So the first half
+millimetre is waited for, and its way is taken. A stroke that bends later on may have its grooves
+turned a little when it is drawn again.
 """
 
 from dataclasses import dataclass, replace
@@ -25,14 +27,16 @@ from .strokes import in_cells, ways
 from .window import window
 
 SETTLE_MM = 0.5  # length from which a stroke's heading is taken
-MARGIN = 2  # cells around a tip: one whose light changes with its neighbour's height, one for rounding
+# cells around a tip: one whose light changes with its neighbour's height, one for rounding
+MARGIN = 2
 
 Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """A part of the picture as it is now: pixels (h, w, 3), uint8 sRGB, from row `top` and column `left` on.
+    """A part of the picture as it is now: pixels (h, w, 3), uint8 sRGB, from row `top` and column
+    `left` on.
 
     If nothing has changed, h and w are 0.
     """
@@ -45,17 +49,23 @@ class Change:
 class Live:
     """A sheet to draw on by hand: `press` a crayon on it, `move` it any number of times, `lift` it.
 
-    x and y are in mm on the sheet, force is in newton; all are taken to a thousandth, as a drawing's file has
-    them. ValueError, one line, for numbers that no drawing may hold, unknown crayons and calls out of order.
-    Made for one thread.
+    x and y are in mm on the sheet, force is in newton; all are taken to a thousandth, as a
+    drawing's file has them. ValueError, one line, for numbers that no drawing may hold, unknown
+    crayons and calls out of order. Made for one thread.
     """
 
     def __init__(
-        self, drawing: Drawing, size: int = Settings.size, *, light: bool = True, threads: int | None = None
+        self,
+        drawing: Drawing,
+        size: int = Settings.size,
+        *,
+        light: bool = True,
+        threads: int | None = None,
     ) -> None:
         """drawing: says the sheet, its paper and its crayons; strokes that it has are drawn first.
 
-        size: of the picture's long side in pixels.   light: shade the relief.   threads: for those first strokes.
+        size: of the picture's long side in pixels.   light: shade the relief.   threads: for those
+            first strokes.
         """
         _, self.easel = api.redraw(drawing, size, threads)
         self.light = light
@@ -64,7 +74,13 @@ class Live:
         self._practise()
 
     def press(
-        self, x_mm: float, y_mm: float, force_n: float, crayon: str, tip: Tip | None = None, note: str = "line"
+        self,
+        x_mm: float,
+        y_mm: float,
+        force_n: float,
+        crayon: str,
+        tip: Tip | None = None,
+        note: str = "line",
     ) -> None:
         """Put a crayon on the paper. Nothing shows before it is moved or lifted."""
         if self._hand:
@@ -97,10 +113,14 @@ class Live:
         return replace(self._drawing, strokes=tuple(self._strokes))
 
     def _practise(self) -> None:
-        """Draw a line without any force, so that the first real ones need wait neither for kernels nor for memory."""
+        """Draw a line without any force, so that the first real ones need wait neither for kernels
+        nor for memory.
+        """
         for array in self.easel.sheet.columns():
             array[::1024] += 0  # memory comes page by page, each when it is first written to
-        hand = _Hand(self.easel, Stroke(*_point(0, 0, 0), self.easel.box.palette.crayons[0].name, Tip()))
+        hand = _Hand(
+            self.easel, Stroke(*_point(0, 0, 0), self.easel.box.palette.crayons[0].name, Tip())
+        )
         self._change(hand, hand.move(*_point(1, 0, 0)))
         hand.lift()
 
@@ -117,7 +137,9 @@ class Live:
         sheet, reach = self.easel.sheet, hand.side // 2 + MARGIN
         top, left, bottom, right = 0, 0, 0, 0
         if len(cells):
-            left, top = np.maximum(np.floor(cells[:, :2].min(0) - 0.5) - reach, 0).astype(int).tolist()
+            left, top = (
+                np.maximum(np.floor(cells[:, :2].min(0) - 0.5) - reach, 0).astype(int).tolist()
+            )
             right, bottom = (np.floor(cells[:, :2].max(0) + 0.5) + reach + 1).astype(int).tolist()
             right, bottom = min(right, sheet.cols), min(bottom, sheet.rows)
         if top >= bottom or left >= right:
@@ -148,7 +170,9 @@ class _Hand:
         return replace(self.dab, path_mm=path_mm, force_n=force)
 
     def move(self, path_mm: Floats, force: Floats) -> Floats:
-        """Go on to a point; returns the points (n, 3) in cells over which it now was drawn, or none."""
+        """Go on to a point; returns the points (n, 3) in cells over which it now was drawn, or
+        none.
+        """
         self._path.append(path_mm)
         self._force.append(force)
         if not self.side:
@@ -191,10 +215,14 @@ class _Hand:
         box, cell_mm, stroke = self.easel.box, self.easel.sheet.cell_mm, self.stroke()
         newton_cells, _, _ = ways(*in_cells([stroke], cell_mm))
         box.take([stroke], newton_cells * cell_mm, self._heading)
-        box.given_mm3[stroke.crayon] = box.given_mm3.get(stroke.crayon, 0.0) + self._given * cell_mm**2 / 1000
+        box.given_mm3[stroke.crayon] = (
+            box.given_mm3.get(stroke.crayon, 0.0) + self._given * cell_mm**2 / 1000
+        )
 
 
 def _point(x_mm: float, y_mm: float, force_n: float) -> tuple[Floats, Floats]:
     """A point as a path and its force, to the thousandth."""
     with np.errstate(over="ignore"):  # beyond float32 is beyond any sheet, and refused as such
-        return np.array([[x_mm, y_mm]]).round(3).astype(np.float32), np.array([force_n]).round(3).astype(np.float32)
+        return np.array([[x_mm, y_mm]]).round(3).astype(np.float32), np.array([force_n]).round(
+            3
+        ).astype(np.float32)

@@ -23,10 +23,12 @@ Floats = NDArray[np.float32]
 
 FINE_MM = 0.3  # a pressed paper is smooth below waves of this length ...
 SPAN = 18.0  # ... its longest ones are so many grains long ...
-ALL_MM = 0.1  # ... and cells of this size see all of its roughness, the standard deviation of which counts as 1
+# ... and cells of this size see all of its roughness, the standard deviation of which counts as 1
+ALL_MM = 0.1
 PIT = 1.1  # how many deviations below the mean its pits begin ...
 BRINK = 0.4  # ... over how many the surface turns down into them ...
-LEVEL, ROUGH, STEEP = 0.92, 0.031, 0.564  # ... and where it lies, how rough it is and how steep they are, of its depth
+# ... and where it lies, how rough it is and how steep they are, of its depth
+LEVEL, ROUGH, STEEP = 0.92, 0.031, 0.564
 PATCH = 2048  # cells along one side of the periodic patch, at most
 
 
@@ -39,7 +41,8 @@ class Paper:
     texture: str
     wavelength_mm: float  # grain of the tooth
     depth_um: float  # from the 0.5 to the 99.5 percentile of heights
-    pits: float = 1.0  # 1: as many peaks as pits; 2 and more: a plateau with pits, as pressed papers have
+    # 1: as many peaks as pits; 2 and more: a plateau with pits, as pressed papers have
+    pits: float = 1.0
     colour: str = "#fdfcf8"
 
 
@@ -51,7 +54,9 @@ def papers() -> dict[str, Paper]:
 
 
 def load_paper(spec: "str | dict[str, Any] | Paper") -> Paper:
-    """A paper from a shipped name, `NAME:COLOUR` (kraft:#204060), a picture file, or a table of its fields."""
+    """A paper from a shipped name, `NAME:COLOUR` (kraft:#204060), a picture file, or a table of its
+    fields.
+    """
     if isinstance(spec, Paper):
         return spec
     if isinstance(spec, dict):
@@ -69,7 +74,9 @@ def load_paper(spec: "str | dict[str, Any] | Paper") -> Paper:
         return _checked(replace(base, colour="#" + colour) if colour else base)
     if os.path.isfile(spec):
         return Paper(spec, "a texture of your own", spec, 0.0, 80.0)
-    raise ValueError(f"paper: {spec!r} is neither a paper nor a picture file{did_you_mean(name, papers())}")
+    raise ValueError(
+        f"paper: {spec!r} is neither a paper nor a picture file{did_you_mean(name, papers())}"
+    )
 
 
 def _checked(paper: Paper) -> Paper:
@@ -78,8 +85,14 @@ def _checked(paper: Paper) -> Paper:
             raise ValueError(f"paper.{key}: {getattr(paper, key)!r} is not a text")
     if paper.texture not in _KINDS and not os.path.isfile(paper.texture):
         kinds = ", ".join(_KINDS)
-        raise ValueError(f"paper.texture: {paper.texture!r} is neither one of {kinds} nor a picture file")
-    for key, low, high in (("wavelength_mm", 0.0, 20.0), ("depth_um", 0.0, 1000.0), ("pits", 0.2, 8.0)):
+        raise ValueError(
+            f"paper.texture: {paper.texture!r} is neither one of {kinds} nor a picture file"
+        )
+    for key, low, high in (
+        ("wavelength_mm", 0.0, 20.0),
+        ("depth_um", 0.0, 1000.0),
+        ("pits", 0.2, 8.0),
+    ):
         value = getattr(paper, key)
         if not isinstance(value, int | float) or not low <= value <= high:
             raise ValueError(f"paper.{key}: {value!r} is not a number from {low:g} to {high:g}")
@@ -112,10 +125,14 @@ def _patch(paper: Paper, shape: tuple[int, int], cell_mm: float, seed: int) -> F
     """One period of a texture, as heights in um."""
     rng = np.random.default_rng([seed, 7])
     if paper.texture == "pressed":
-        return _pressed(shape, max(paper.wavelength_mm, 0.01), cell_mm, rng) * np.float32(paper.depth_um)
+        return _pressed(shape, max(paper.wavelength_mm, 0.01), cell_mm, rng) * np.float32(
+            paper.depth_um
+        )
     wavelength = max(paper.wavelength_mm / cell_mm, 1.0)
     patch = _TEXTURES[paper.texture](shape, wavelength, rng)
-    low, high = np.percentile(patch[:: max(1, shape[0] // 512), :: max(1, shape[1] // 512)], (0.5, 99.5))
+    low, high = np.percentile(
+        patch[:: max(1, shape[0] // 512), :: max(1, shape[1] // 512)], (0.5, 99.5)
+    )
     patch -= low
     patch /= max(high - low, np.float32(1e-12))
     np.clip(patch, 0, 1, out=patch)
@@ -132,12 +149,15 @@ def _even(n: int) -> int:
 
 
 def _convolve(noise: Floats, spot: Floats) -> Floats:
-    """A lattice of noise, convolved in its place, periodically, with a spot (van Wijk's spot noise)."""
+    """A lattice of noise, convolved in its place, periodically, with a spot (van Wijk's spot
+    noise).
+    """
     import cv2
 
     kernel = np.zeros(noise.shape, np.float32)
     down, along = (np.arange(n) - n // 2 for n in spot.shape)
-    np.add.at(kernel, (down[:, None] % noise.shape[0], along % noise.shape[1]), spot)  # a large spot wraps round
+    # a large spot wraps round
+    np.add.at(kernel, (down[:, None] % noise.shape[0], along % noise.shape[1]), spot)
     cv2.mulSpectrums(cv2.dft(noise, noise), cv2.dft(kernel, kernel), 0, noise)
     return np.asarray(cv2.dft(noise, noise, cv2.DFT_INVERSE | cv2.DFT_SCALE), np.float32)
 
@@ -160,16 +180,22 @@ def _arc(radius: float, width: float) -> Floats:
 
 def _stipple(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> Floats:
     """Uniform noise whose amplitude a tiled mask of dots scales (Fig. 1, right)."""
-    down = 2 * max(round(shape[0] / (8 * wavelength)), 1)  # whole dots and pairs of rows, so that patches join
+    # whole dots and pairs of rows, so that patches join
+    down = 2 * max(round(shape[0] / (8 * wavelength)), 1)
     along = max(round(shape[1] / (4 * wavelength)), 1)
-    y, x = (np.arange(shape[0])[:, None] + 0.5) * (down / shape[0]), (np.arange(shape[1]) + 0.5) * (along / shape[1])
+    y, x = (
+        (np.arange(shape[0])[:, None] + 0.5) * (down / shape[0]),
+        (np.arange(shape[1]) + 0.5) * (along / shape[1]),
+    )
     dx, dy = (x + (y // 1 % 2) / 2) % 1 - 0.5, y % 1 - 0.5
     dots = np.clip(1.35 - 2.6 * np.hypot(dx, dy), 0, 1).astype(np.float32)
     return np.asarray(dots * (0.35 + 0.65 * rng.random(shape)), np.float32)
 
 
 def _felt(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -> Floats:
-    """Drawing paper pressed on a felt: a fine tooth over slow swells (two bands of smooth noise)."""
+    """Drawing paper pressed on a felt: a fine tooth over slow swells (two bands of smooth
+    noise).
+    """
 
     def band(noise: Floats, scale: float, share: float) -> Floats:
         smooth = _convolve(noise, _dome(max(scale * wavelength, 0.5)))
@@ -184,11 +210,14 @@ def _felt(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -
     return _sum(bands)
 
 
-def _pressed(shape: tuple[int, int], grain_mm: float, cell_mm: float, rng: np.random.Generator) -> Floats:
-    """Paper pressed smooth: an even surface with pits of all sizes; 0 and 1 are the percentiles 0.5 and 99.5.
+def _pressed(
+    shape: tuple[int, int], grain_mm: float, cell_mm: float, rng: np.random.Generator
+) -> Floats:
+    """Paper pressed smooth: an even surface with pits of all sizes; 0 and 1 are the percentiles 0.5
+    and 99.5.
 
-    Waves shorter than the cells can hold are left out, not folded into longer ones; all others have the same height
-    on cells of any size.
+    Waves shorter than the cells can hold are left out, not folded into longer ones; all others have
+    the same height on cells of any size.
     """
     down = np.fft.fftfreq(shape[0], cell_mm).astype(np.float32)[:, None]
     along = np.fft.rfftfreq(shape[1], cell_mm).astype(np.float32)
@@ -196,19 +225,28 @@ def _pressed(shape: tuple[int, int], grain_mm: float, cell_mm: float, rng: np.ra
     waves *= np.sqrt(_roughness(np.hypot(down, along), grain_mm))
     z = np.asarray(np.fft.irfft2(waves, shape), np.float32)
     f = np.geomspace(0.02 / grain_mm, 0.5 / ALL_MM, 400)
-    z /= np.float32(cell_mm * np.sqrt(2 * np.pi * np.trapezoid(_roughness(f, grain_mm) * f * f, np.log(f))))
-    pit = np.float32(BRINK) * np.logaddexp(np.float32(0), (np.float32(-PIT) - z) / np.float32(BRINK))
-    return np.asarray(np.clip(np.float32(LEVEL) + np.float32(ROUGH) * z - np.float32(STEEP) * pit, 0, 1), np.float32)
+    z /= np.float32(
+        cell_mm * np.sqrt(2 * np.pi * np.trapezoid(_roughness(f, grain_mm) * f * f, np.log(f)))
+    )
+    pit = np.float32(BRINK) * np.logaddexp(
+        np.float32(0), (np.float32(-PIT) - z) / np.float32(BRINK)
+    )
+    return np.asarray(
+        np.clip(np.float32(LEVEL) + np.float32(ROUGH) * z - np.float32(STEEP) * pit, 0, 1),
+        np.float32,
+    )
 
 
 def _roughness(f: NDArray[Any], grain_mm: float) -> NDArray[Any]:
     """Power of a pressed paper's waves by wave number f in 1/mm.
 
-    Scanned drawing papers fall as f^-1 down to their grain, as f^-2.3 below it, and as f^-4 where the press has
-    smoothed them.
+    Scanned drawing papers fall as f^-1 down to their grain, as f^-2.3 below it, and as f^-4 where
+    the press has smoothed them.
     """
     slow = np.maximum(f * grain_mm, 1 / SPAN) ** -1.0
-    return np.asarray(slow * np.maximum(f * grain_mm, 1) ** -1.3 * np.maximum(f * FINE_MM, 1) ** -1.7)
+    return np.asarray(
+        slow * np.maximum(f * grain_mm, 1) ** -1.3 * np.maximum(f * FINE_MM, 1) ** -1.7
+    )
 
 
 def _sum(parts: "list[Future[Floats]]") -> Floats:

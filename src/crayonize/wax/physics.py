@@ -1,4 +1,6 @@
-"""What a wax is like: the constants of Table 1 and those that it lacks, and how the kernels take them."""
+"""What a wax is like: the constants of Table 1 and those that it lacks, and how the kernels take
+them.
+"""
 
 import functools
 import tomllib
@@ -40,7 +42,9 @@ class Constants(NamedTuple):
 
 @dataclass(frozen=True)
 class Physics:
-    """Constants of the wax (Table 1), with the paper's grey level read as 1 um; see data/physics.toml."""
+    """Constants of the wax (Table 1), with the paper's grey level read as 1 um; see
+    data/physics.toml.
+    """
 
     mu_paper: float  # friction of bare paper
     mu_wax: float  # friction of wax
@@ -57,24 +61,29 @@ class Physics:
     bears: float  # N per mm^2 of the tip that wax bears before it yields: no hand presses harder
     epsilon_um: float  # accuracy of the force, as a sum of overlaps over cells
     firm: float  # share of the wax's height that holds the crayon up; the rest yields (1 in Fig. 4)
-    heap: float  # share of a cell's wax that counts as out of reach: Fig. 6 rubs on the paper alone (1)
+    # share of a cell's wax that counts as out of reach: Fig. 6 rubs on the paper alone (1)
+    heap: float
     yields: float  # sum of pulls at which half of what could move does (0: all, as in a liquid)
     slip: float  # share of the force that comes and goes as the crayon sticks and slips ...
     slip_mm: float  # ... over this length
     step: float  # from one contact to the next, as a share of the tip's extent; 0: cell by cell
-    wear: float  # share of a cell's loss that deepens the cell itself; the rest the whole tip shares
-    pigment: float  # how much stronger the wax is coloured than that of crayons, for which palettes are given
+    # share of a cell's loss that deepens the cell itself; the rest the whole tip shares
+    wear: float
+    # how much stronger the wax is coloured than that of crayons, for which palettes are given
+    pigment: float
     usual: float  # mean of mu * sin(S, F) over a drawing, for the plan of wear
 
     def worn_per_newton_mm(self) -> float:
-        """Wax worn off a tip's relief, in um mm^2 per newton and mm of path: rate * mu * sin / lambda."""
+        """Wax worn off a tip's relief, in um mm^2 per newton and mm of path: rate * mu * sin /
+        lambda.
+        """
         return self.wear * self.rate_per_mm * self.usual / self.lam
 
     def hop(self, cell_mm: float) -> tuple[float, float]:
         """How far smeared wax goes, in cells: the mean, and how far each hop may differ from it.
 
-        Hops are whole cells. Where they are two and more they scatter, or they would part the cells into
-        lattices.
+        Hops are whole cells. Where they are two and more they scatter, or they would part the cells
+        into lattices.
         """
         cells = self.reach_mm / cell_mm
         if cells < WHOLE:

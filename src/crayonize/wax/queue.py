@@ -1,8 +1,8 @@
 """Which strokes may be drawn side by side.
 
-Strokes that share no tile of the sheet commute. A stroke waits for the last one before it on each tile it
-touches, and for nothing else, so on any number of threads the wax is the same, bit for bit, as if all strokes
-were drawn one after another.
+Strokes that share no tile of the sheet commute. A stroke waits for the last one before it on each
+tile it touches, and for nothing else, so on any number of threads the wax is the same, bit for bit,
+as if all strokes were drawn one after another.
 """
 
 import threading
@@ -27,7 +27,9 @@ PAUSE_S = 5e-5  # ... for so long
 
 
 class Order(NamedTuple):
-    """For each stroke how many it waits for, and which wait for it: heirs[first[s] : first[s + 1]]."""
+    """For each stroke how many it waits for, and which wait for it: heirs[first[s] : first[s +
+    1]].
+    """
 
     waits: NDArray[np.int32]
     first: NDArray[np.int64]
@@ -46,15 +48,22 @@ def _touch(points, first, reach, s, tile, mark, found):  # type: ignore[no-untyp
         j = max(i - 1, first[s])
         far = max(abs(points[i, 0] - points[at, 0]), abs(points[i, 1] - points[at, 1]))
         if i > first[s] and far <= tile / 2:
-            continue  # the way here from the sample, and so all between, lies within what the sample reaches
+            # the way here from the sample, and so all between, lies within what the sample reaches
+            continue
         dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
         parts = 1 + int(max(abs(dx), abs(dy)) / tile)
         at = i
         for p in range(parts + 1):
             t = p / parts
             x, y = points[j, 0] + t * dx, points[j, 1] + t * dy
-            top, bottom = max(0, int((y - reach[s]) // tile)), min(tiles_y - 1, int((y + reach[s]) // tile))
-            left, right = max(0, int((x - reach[s]) // tile)), min(tiles_x - 1, int((x + reach[s]) // tile))
+            top, bottom = (
+                max(0, int((y - reach[s]) // tile)),
+                min(tiles_y - 1, int((y + reach[s]) // tile)),
+            )
+            left, right = (
+                max(0, int((x - reach[s]) // tile)),
+                min(tiles_x - 1, int((x + reach[s]) // tile)),
+            )
             for ty in range(top, bottom + 1):
                 for tx in range(left, right + 1):
                     if mark[ty, tx] != s:
@@ -98,16 +107,21 @@ def _order(points, first, reach, rows, cols, tile):  # type: ignore[no-untyped-d
 
 
 def order(
-    points: NDArray[np.float32], first: NDArray[np.int64], reach: NDArray[np.float32], rows: int, cols: int
+    points: NDArray[np.float32],
+    first: NDArray[np.int64],
+    reach: NDArray[np.float32],
+    rows: int,
+    cols: int,
 ) -> Order:
-    """What each stroke waits for; `points` (n, 3) in cells, `reach` (strokes,) how far its tip can change cells.
+    """What each stroke waits for; `points` (n, 3) in cells, `reach` (strokes,) how far its tip can
+    change cells.
 
     A path between two points is sampled once a tile, so `reach` is widened by half a tile.
     """
     return Order(*_order(points, first, (reach + TILE // 2).astype(np.float32), rows, cols, TILE))
 
 
-# ---- at work ---------------------------------------------------------------------------------------------
+# ---- at work -------------------------------------------------------------------------------------
 
 
 class Queue(NamedTuple):
@@ -117,7 +131,8 @@ class Queue(NamedTuple):
     first: NDArray[np.int64]  # as in the order
     heirs: NDArray[np.int32]
     ready: NDArray[np.int32]  # the heap
-    state: NDArray[np.int64]  # how many are ready, how many are not yet drawn, whether to stop before the end
+    # how many are ready, how many are not yet drawn, whether to stop before the end
+    state: NDArray[np.int64]
     lock: NDArray[np.int32]  # its first is 1 while a thread changes any of this
 
 
@@ -126,13 +141,17 @@ def queue(plan: Order) -> Queue:
     ready = np.flatnonzero(plan.waits == 0).astype(np.int32)  # sorted, which is a heap
     heap = np.concatenate([ready, np.zeros(len(plan.waits) - len(ready), np.int32)])
     state = np.array([len(ready), len(plan.waits), 0])
-    return Queue(plan.waits.copy(), plan.first, plan.heirs, heap, state, np.zeros(2 * AWAY, np.int32))
+    return Queue(
+        plan.waits.copy(), plan.first, plan.heirs, heap, state, np.zeros(2 * AWAY, np.int32)
+    )
 
 
 def exchange(array: NDArray[np.int32], index: int, value: int) -> int:
-    """Put a value into an array and return what was there, in one step that no other thread can divide.
+    """Put a value into an array and return what was there, in one step that no other thread can
+    divide.
 
-    Here as Python does it, without a compiler for one thread alone; kernels have the machine's instruction.
+    Here as Python does it, without a compiler for one thread alone; kernels have the machine's
+    instruction.
     """
     before, array[index] = array[index], value
     return int(before)
@@ -142,7 +161,9 @@ def exchange(array: NDArray[np.int32], index: int, value: int) -> int:
 def _exchange(typing: Any, array: Any, index: Any, value: Any) -> Any:
     def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         kind, pointer = signature.args[0], cast(Any, cgutils.get_item_pointer)
-        place = pointer(context, builder, kind, context.make_array(kind)(context, builder, given[0]), [given[1]])
+        place = pointer(
+            context, builder, kind, context.make_array(kind)(context, builder, given[0]), [given[1]]
+        )
         return builder.atomic_rmw("xchg", place, given[2], "seq_cst")
 
     return array.dtype(array, types.intp, array.dtype), code
@@ -156,7 +177,8 @@ def _exchange_for(array, index, value):  # type: ignore[no-untyped-def]
 
 @lean_kernel
 def take(queue, done):  # type: ignore[no-untyped-def]
-    """The earliest stroke that is ready, or NONE or OVER; those that waited for `done` alone become so before.
+    """The earliest stroke that is ready, or NONE or OVER; those that waited for `done` alone become
+    so before.
 
     done: a stroke taken earlier, or NONE or OVER.
     """
@@ -208,7 +230,9 @@ def _pop(heap, size):  # type: ignore[no-untyped-def]
 
 @lean_kernel
 def patient_take(queue, done):  # type: ignore[no-untyped-def]
-    """As `take`, but asks many times before it returns NONE: what is ready next mostly is so within microseconds."""
+    """As `take`, but asks many times before it returns NONE: what is ready next mostly is so within
+    microseconds.
+    """
     taken = take(queue, done)
     for _ in range(PATIENCE):
         if taken != NONE:
@@ -227,8 +251,9 @@ def run(
 ) -> None:
     """Have strokes drawn on `threads` threads, each stroke after those it waits for.
 
-    draw(queue, done): tells the queue that `done` is drawn, and takes from it and draws one stroke or many; returns
-    the last one if the queue does not yet know that it is drawn, else NONE or OVER.
+    draw(queue, done): tells the queue that `done` is drawn, and takes from it and draws one stroke
+    or many; returns the last one if the queue does not yet know that it is drawn, else NONE or
+    OVER.
     progress: called in this thread with the number of strokes done.
     """
     work, failures = queue(plan), list[BaseException]()

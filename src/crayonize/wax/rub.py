@@ -26,9 +26,9 @@ def _draw(queue, done, alone, points, first, wax_of, tip_of, masks, sides, reach
     """Draw strokes as the queue gives them out (see `queue.run`).
 
     done: a stroke drawn before that the queue is told of; alone: return after one stroke.
-    points (n, 3): x, y in cells, force in N; first (strokes + 1): where each stroke's points begin; masks
-    (tips, cells): with a border of `reach` ABSENT cells, `sides` long; wax_of, tip_of (strokes,): which crayon
-    draws each stroke, and with which mask; loss (strokes,): wax given.
+    points (n, 3): x, y in cells, force in N; first (strokes + 1): where each stroke's points begin;
+    masks (tips, cells): with a border of `reach` ABSENT cells, `sides` long; wax_of, tip_of
+    (strokes,): which crayon draws each stroke, and with which mask; loss (strokes,): wax given.
     """
     s = schedule.patient_take(queue, done)
     while s >= 0:
@@ -52,9 +52,11 @@ def rub(
 ) -> float:
     """Draw strokes on a sheet in order; returns the wax the crayons gave, in um times cells.
 
-    watch: is given the points (n, 3) in cells, where each stroke begins among them, and how far each reaches;
-    what it returns is called, in any thread, with the number of the stroke just drawn: then the tiles (of
-    queue.TILE cells) within its reach hold this stroke and all before it, and no later one.
+    watch: is given the points (n, 3) in cells, where each stroke begins among them, and how far
+        each reaches;
+    what it returns is called, in any thread, with the number of the stroke just drawn: then the
+    tiles (of queue.TILE cells) within its reach hold this stroke and all before it, and no later
+    one.
     """
     if not strokes:
         return 0.0

@@ -1,6 +1,7 @@
 """A sheet of paper and the wax on it (section 3.1 of the paper).
 
-A sheet is a height field (the paper's tooth) with a column of wax on each cell, see `columns`. Heights are
+A sheet is a height field (the paper's tooth) with a column of wax on each cell, see `columns`.
+Heights are
 in um. Per cell: paper 4, total 4, used 1, crayons 4, layer heights 16, blend 28 = 57 bytes.
 """
 
@@ -16,7 +17,9 @@ class Sheet:
     """A sheet of paper and the wax on it. All arrays are flat views over rows x cols cells."""
 
     def __init__(self, tooth: Floats, cell_mm: float, k: Floats, s: Floats) -> None:
-        """`tooth` (rows, cols) um; `k`, `s` (crayons, 3) absorption and scattering per um, linear RGB."""
+        """`tooth` (rows, cols) um; `k`, `s` (crayons, 3) absorption and scattering per um, linear
+        RGB.
+        """
         self.rows, self.cols = tooth.shape
         self.cell_mm = cell_mm
         self.optics = np.ascontiguousarray(np.concatenate([k, s], 1), np.float32)
@@ -30,7 +33,11 @@ class Sheet:
 
     def columns(self) -> Columns:
         """What the kernels take."""
-        crayon, layer, blend = self.crayon.reshape(-1), self.layer.reshape(-1), self.blend.reshape(-1)
+        crayon, layer, blend = (
+            self.crayon.reshape(-1),
+            self.layer.reshape(-1),
+            self.blend.reshape(-1),
+        )
         return Columns(
             self.paper, self.total, self.used, crayon, layer, blend, self.optics.reshape(-1)
         )

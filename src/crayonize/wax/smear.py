@@ -1,7 +1,8 @@
 """Smearing: standing wax is pushed to the eight neighbours (Eq. 4, Fig. 7).
 
-All amounts come from one snapshot, so no cell is favoured. Wax on its way lies sorted by crayon in slots
-of the window, slot 0 for the crayon in hand, and is laid on when the contact is over (`settle`).
+All amounts come from one snapshot, so no cell is favoured. Wax on its way lies sorted by crayon in
+slots of the window, slot 0 for the crayon in hand, and is laid on when the contact is over
+(`settle`).
 """
 
 import numpy as np
@@ -40,7 +41,9 @@ def _add_to(total, more):  # type: ignore[no-untyped-def]
 
 @lean_kernel
 def weigh(w, side, hop, vx, vy, alpha, beta):  # type: ignore[no-untyped-def]
-    """How strongly each cell is drawn to each neighbour (Eq. 4); those off the sheet stand too high."""
+    """How strongly each cell is drawn to each neighbour (Eq. 4); those off the sheet stand too
+    high.
+    """
     size, edge = w.film.size, hop * side + hop
     end = side * side - edge
     for at in range(edge, end):
@@ -48,7 +51,8 @@ def weigh(w, side, hop, vx, vy, alpha, beta):  # type: ignore[no-untyped-def]
     for k in range(8):
         dy, dx = neighbour(k)
         near = np.float32(1) if k < 4 else np.float32(0.70710678)
-        share = np.float32(1) if k < 4 else np.float32(0.5)  # cosine and distance, diagonally 1/sqrt 2 each
+        # cosine and distance, diagonally 1/sqrt 2 each
+        share = np.float32(1) if k < 4 else np.float32(0.5)
         directional = beta * (np.float32(dx) * vx + np.float32(dy) * vy) * share
         to, plane = step(k, side, hop), k * size
         _pull(
@@ -65,10 +69,10 @@ def weigh(w, side, hop, vx, vy, alpha, beta):  # type: ignore[no-untyped-def]
 def smear(w, side, hop, home, nu, yields, columns):  # type: ignore[no-untyped-def]
     """Push standing wax to the neighbours `hop` cells away (Fig. 7); returns the slots in use.
 
-    Of what stands the share nu * pull / (pull + yields) goes, where `pull` is the sum of weights. Fig. 7 moves
-    nu of it however small the pull (yields = 0): past the level that it seeks, and back at the next contact,
-    which leaves a grain of single cells. Pure wax is on its way in `arriving` when this returns; the blend has
-    already arrived.
+    Of what stands the share nu * pull / (pull + yields) goes, where `pull` is the sum of weights.
+    Fig. 7 moves nu of it however small the pull (yields = 0): past the level that it seeks, and
+    back at the next contact, which leaves a grain of single cells. Pure wax is on its way in
+    `arriving` when this returns; the blend has already arrived.
     """
     size, edge = w.film.size, hop * side + hop
 
@@ -128,7 +132,9 @@ def open_slot(w, cells, slot, wax, begin):  # type: ignore[no-untyped-def]
 
 @inner_kernel
 def _take(w, cells, slots, at, cell, left, scale, columns):  # type: ignore[no-untyped-def]
-    """Lift `left` um off the pure layers of a column; returns what they did not have, and the slots in use."""
+    """Lift `left` um off the pure layers of a column; returns what they did not have, and the slots
+    in use.
+    """
     crayon, layer = columns.crayon, columns.layer
     base, n, kept = whole(cell * LAYERS), np.int64(columns.used[cell]), 0
     for down in range(LAYERS):

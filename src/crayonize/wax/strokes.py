@@ -1,4 +1,6 @@
-"""Strokes as the kernels take them: points in cells, and what must be known of each before it is drawn."""
+"""Strokes as the kernels take them: points in cells, and what must be known of each before it is
+drawn.
+"""
 
 from collections.abc import Sequence
 
@@ -33,7 +35,11 @@ def ways(
     """
     newton_cells, cells, double = np.zeros((3, len(first) - 1))
     _measure(points, first, newton_cells, cells, double)
-    return newton_cells, cells, np.round(double / (2 * np.pi) * box.HEADINGS).astype(np.int64) % box.HEADINGS
+    return (
+        newton_cells,
+        cells,
+        np.round(double / (2 * np.pi) * box.HEADINGS).astype(np.int64) % box.HEADINGS,
+    )
 
 
 @lean_kernel

@@ -30,8 +30,8 @@ def mask(
 ) -> NDArray[np.float32]:
     """The mask of a tip on a grid of `cell_mm`, with grooves along `heading_rad`, the way it moves.
 
-    worn_um: mean height that has been rubbed off, which cuts its profile flat from below; the bumps come anew.
-    Returns (n, n) float32 in um with n odd, the lowest present cell at 0.
+    worn_um: mean height that has been rubbed off, which cuts its profile flat from below; the bumps
+    come anew. Returns (n, n) float32 in um with n odd, the lowest present cell at 0.
     """
     if tip.kind not in DROPS_UM:
         raise ValueError(f"tip.kind: {tip.kind!r} is none of {', '.join(DROPS_UM)}")
@@ -82,14 +82,18 @@ def _profile(
     if tip.kind == "blunt":
         return radius**4, radius <= 1
     if tip.kind == "rim":  # the worn back end: one side of a ring touches, the hollow stays above
-        return (radius - 0.75) ** 2 * 4 + 0.6 * (1 - along), (radius <= 1) & (radius > RIM_INNER) & (along > RIM_FROM)
+        return (radius - 0.75) ** 2 * 4 + 0.6 * (1 - along), (radius <= 1) & (
+            radius > RIM_INNER
+        ) & (along > RIM_FROM)
     breadth = max(SIDE_MM / tip.width_mm, 1e-3)
     return (across / breadth) ** 2, (np.abs(across) <= breadth) & (np.abs(along) <= 1)
 
 
 @functools.lru_cache(maxsize=16)
 def _groove(wavelength: float, heading_rad: float) -> NDArray[np.float32]:
-    """What smooths noise to bumps `wavelength` cells across the heading and GROOVE times that along it."""
+    """What smooths noise to bumps `wavelength` cells across the heading and GROOVE times that along
+    it.
+    """
     across = max(0.3 * wavelength, 0.4)
     along = GROOVE * across
     reach = int(np.ceil(2.5 * along))

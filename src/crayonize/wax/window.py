@@ -1,8 +1,9 @@
 """The cells under a crayon: a thread's work space, and how a contact looks at the sheet through it.
 
-A window is a square of cells, kept row by row in flat arrays, in which the neighbour on one side of every
-cell lies equally far on. So weighing, flowing and rubbing off are plain loops over arrays, which the
-compiler turns into vector instructions; only taking wax off columns and laying it on goes cell by cell.
+A window is a square of cells, kept row by row in flat arrays, in which the neighbour on one side of
+every cell lies equally far on. So weighing, flowing and rubbing off are plain loops over arrays,
+which the compiler turns into vector instructions; only taking wax off columns and laying it on goes
+cell by cell.
 """
 
 from typing import Any, NamedTuple
@@ -17,17 +18,22 @@ from .columns import BLEND, whole
 NONE = 255  # no slot
 PRESENT = np.float32(1e8)  # um; cells of a tip's mask that stand higher are no part of it
 
-# What `hand` holds: height of the tip (um), offsets (cells), strides to the next contact, cells walked,
-# contacts so far, the stroke's own number, and how the tip spreads about its middle (cells^2).
-HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS, OWN, SPREAD_XX, SPREAD_XY, SPREAD_YY = range(10)
+# What `hand` holds: height of the tip (um), offsets (cells), strides to the next contact, cells
+# walked, contacts so far, the stroke's own number, and how the tip spreads about its middle
+# (cells^2).
+HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS, OWN, SPREAD_XX, SPREAD_XY, SPREAD_YY = range(
+    10
+)
 
 Floats = NDArray[np.float32]
 
 
 class Window(NamedTuple):
-    """A thread's work space. All but the last five hold values for each cell of the window, row by row.
+    """A thread's work space. All but the last five hold values for each cell of the window, row by
+    row.
 
-    Wax on its way is sorted by crayon: each crayon met at a contact gets a slot, the one in hand slot 0.
+    Wax on its way is sorted by crayon: each crayon met at a contact gets a slot, the one in hand
+        slot 0.
     """
 
     where: NDArray[np.uint32]  # number of the cell on the sheet, less that of the window's first
@@ -51,7 +57,9 @@ class Window(NamedTuple):
 
 
 def window(cells: int, crayons: int) -> Window:
-    """Work space for tips of up to `cells` cells, border included, and so many crayons in the box."""
+    """Work space for tips of up to `cells` cells, border included, and so many crayons in the
+    box.
+    """
 
     def floats(planes: int) -> Floats:
         return np.zeros(planes * cells, np.float32)
