@@ -96,6 +96,8 @@ def photo_parser() -> Parser:
     )
     add("--focus", type=_focus, action="append", default=[], metavar="X,Y,W,H",
         help="a part that deserves care, in fractions of the picture; may be repeated")  # fmt: skip
+    add("--sheet", dest="sheet_mm", type=_sheet, default=Settings.sheet_mm, metavar="SIZE",
+        help="long side of the sheet: a5, a4, 180mm; strokes keep their width (a5)")  # fmt: skip
     add("--print", choices=page.PAGES, help="fill a page of this size")
     add("--dpi", type=_dpi, help="pixels to the inch, in place of --size (300 with --print)")
     add(
@@ -192,6 +194,21 @@ def _whole(text: str) -> int:
         return int(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+
+
+def _sheet(text: str) -> float:
+    """Long side in mm of a sheet given by the name of a page or in mm."""
+    if text in page.PAGES:
+        return page.PAGES[text][1]
+    try:
+        sheet_mm = float(text.removesuffix("mm"))
+    except ValueError:
+        sheet_mm = 0
+    if not 10 <= sheet_mm <= 5000:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is neither a page ({', '.join(page.PAGES)}) nor 10mm to 5000mm"
+        )
+    return sheet_mm
 
 
 def _dpi(text: str) -> float:
