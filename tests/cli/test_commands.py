@@ -182,6 +182,8 @@ def test_output_beside_the_photo_and_every_other_option(photo, run, tmp_path):
         "0.2,0.2,0.4,0.5",
         "--focus",
         "0,0,.1,.1",
+        "--sheet",
+        "150mm",
         "--no-light",
     )
     assert code == 0 and out == ""
@@ -198,6 +200,8 @@ BAD = [
     (2, [], "PHOTO"),
     (2, ["-q"], "PHOTO"),
     (2, ["{tmp}/missing.jpg", OUT], "missing.jpg", "No such file"),
+    (2, [PHOTO, OUT, "--sheet", "a55"], "--sheet", "'a55'", "10mm to 5000mm"),
+    (2, [PHOTO, OUT, "--sheet", "9mm"], "--sheet", "'9mm'"),
     (2, [TEXT, OUT], "text.jpg", "picture"),
     (2, [FOLDER, OUT], "two folders"),
     (2, [FOLDER], "is a folder"),
