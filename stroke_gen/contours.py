@@ -27,7 +27,7 @@ from .swatches import Swatches, firmness
 Floats = NDArray[np.float32]
 SCALE = 2  # edge pixels per work cell
 BUDGET = 7.0  # length of all lines at `lines` = 1, in long sides of the sheet
-DARKER = 0.16  # OKLab L by which a line is darker than what it bounds
+DARKER = 0.14  # OKLab L by which a line is darker than what it bounds
 LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
 CURLED = 0.6  # radians a width by which worms along fringes turn: they say nothing
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
