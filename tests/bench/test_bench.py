@@ -137,7 +137,7 @@ def test_time_within_a_stage_is_counted_once(monkeypatch):
 
 def test_cell_steps_are_counted_as_the_kernels_make_them(monkeypatch):
     monkeypatch.setattr(bench, "seconds_of", lambda act: (act(), 1.0)[1])
-    side, edge, stride, lines = 150, bench.TIP_CELLS, 0.14 * 25, 14
+    side, edge, stride, lines = 150, bench.TIP_CELLS, 0.16 * bench.TIP_CELLS, 14
     contacts = lines * (side - 2 * edge) / stride
     assert bench._rubbed(side, True) == pytest.approx(contacts * math.pi / 4 * 24**2, rel=0.05)
 
