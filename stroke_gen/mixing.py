@@ -104,7 +104,6 @@ def combine(ground, crayons, pressures, wax, colour, price):  # type: ignore[no-
     """OKLab (choices, 3) and price of grain of every choice of pressures for crayons laid over a
     ground.
 
-
     crayons: lightest first; pressures: which of the table's, 0 for none, 1 for its first. Choices
     count the first crayon's pressure slowest.
     """

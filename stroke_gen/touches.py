@@ -120,8 +120,7 @@ def wanted(plan: Plan, now: Floats, coat: Pass, cells: float) -> dict[int, Float
     place.
 
     Only shapes are touched up, not tones: the sheet is compared with the photo as it would look in
-        the sheet's own
-    tones. now: linear (h, w, 3); cells: width of the tip.
+    the sheet's own tones. now: linear (h, w, 3); cells: width of the tip.
     """
     scene, swatches = plan.scene, plan.swatches
     tones = analysis.wide_blur(now, TONES * cells), analysis.wide_blur(scene.target, TONES * cells)

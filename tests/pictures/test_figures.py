@@ -96,7 +96,7 @@ def test_fig10_crayons_show_on_white_and_on_black(figures):
     light wax less.
     """
     for easel, silent, least in zip(
-        figures.crayons(CELL), ("white", "black"), (0.33, 1.0), strict=True
+        figures.crayons(CELL)[:2], ("white", "black"), (0.33, 1.0), strict=True
     ):
         change = np.abs(easel.picture(light=False) / np.array(easel.ground, np.float32) - 1)
         for i, crayon in enumerate(easel.box.palette.crayons):

@@ -39,7 +39,7 @@ def colour_crayon(name: str, colour: str, hiding: float, film_um: float) -> Cray
 
     What its front surface reflects is taken off the colour. Rb is `hiding` Rw, and more in channels
     half bright: there thick wax of even hiding would be much darker than its hex, and heavy red
-        brown, which it is not.
+    brown, which it is not.
     """
     layers = []
     for value in light_of(colour):

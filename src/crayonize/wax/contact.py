@@ -178,7 +178,7 @@ def move(w, held, table, a, b):  # type: ignore[no-untyped-def]
     """Draw on from point a to point b, each x, y in cells and force in N; returns the wax given.
 
     There is a contact every so many cells: a share `step` of the tip's extent along the way, at
-        least one.
+    least one.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     length = np.hypot(dx, dy)

@@ -53,10 +53,9 @@ def rub(
     """Draw strokes on a sheet in order; returns the wax the crayons gave, in um times cells.
 
     watch: is given the points (n, 3) in cells, where each stroke begins among them, and how far
-        each reaches;
-    what it returns is called, in any thread, with the number of the stroke just drawn: then the
-    tiles (of queue.TILE cells) within its reach hold this stroke and all before it, and no later
-    one.
+    each reaches; what it returns is called, in any thread, with the number of the stroke just
+    drawn: then the tiles (of queue.TILE cells) within its reach hold this stroke and all before
+    it, and no later one.
     """
     if not strokes:
         return 0.0
