@@ -60,6 +60,7 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
     with ThreadPoolExecutor(threads) as pool:
+        swatches = swatches.upto(style.hardest)
         seen = scene.read(photo, subject, width_mm, height_mm, swatches, style, focus, pool)
         plan = _plan(seen, swatches, style, rng, pool)
         tip = style.tip_mm / seen.cell_mm

@@ -36,7 +36,6 @@ DARK_BODY = 0.46  # OKLab L below which skin and hair are dark
 WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
 BEAM = 3  # mixtures of each length that are tried with one crayon more
-FEW = np.array([0, 1, 3, 4, 6])  # pressures of four crayons; of three and fewer all are tried
 
 
 class Wax(NamedTuple):
@@ -226,7 +225,7 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
             wider = _extended(*found[-1], np.flatnonzero(allowed), rank)
             if not wider.size:
                 break
-            found.append((wider, tried(wider, allowed, full if length < 4 else FEW)))
+            found.append((wider, tried(wider, allowed, full if length < 4 else few(len(full) - 1))))
         mixtures, cost = found[length - 1]
         if not cost.size:
             break
@@ -235,6 +234,11 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
             least[g], best[g] = cost[g, at[g]], -1
             best[g, :length] = mixtures[g, at[g]]
     return Mixtures(best)
+
+
+def few(number: int) -> Ints:
+    """Of no pressure and `number` pressures, those that are tried with four crayons."""
+    return np.unique(np.linspace(0, number, 5).round()).astype(np.int64)
 
 
 def _samples(
@@ -253,7 +257,7 @@ def _samples(
 def prices(sample: Floats, swatches: Swatches) -> Floats:
     """What a crayon costs in a surface (surfaces, crayons), beside the distance it leaves."""
     colours = oklab(swatches.over(swatches.paper))
-    hue, heavy = colours[:, -3, 1:], colours[:, -1]
+    hue, heavy = swatches.masstone()[:, 1:], colours[:, -1]
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
@@ -269,7 +273,7 @@ def foreign(swatches: Swatches, width_rad: float) -> Floats:
     """How foreign each crayon (crayons,) is to skin or hair: 0 within `width_rad` of their hue, 1
     far from it.
     """
-    hue = oklab(swatches.over(swatches.paper))[:, -3]
+    hue = swatches.masstone()
     chroma = np.linalg.norm(hue[:, 1:], axis=1)
     warm = (hue[:, 1] * np.cos(WARM) + hue[:, 2] * np.sin(WARM)) / (chroma + 1e-6)
     off = np.clip((np.arccos(np.clip(warm, -1, 1)) - width_rad) / 0.5, 0, 1)

@@ -72,6 +72,7 @@ class Style:
     wrist_deg: Annotated[float, -90, 90] = -50.0
     wrist: Annotated[float, 0, 100] = 0.3  # how much the wrist counts against the form
     press: Annotated[float, 0.1, 5] = 1.0  # factor on all forces
+    hardest: Annotated[float, 0.1, 2] = 2.0  # N/mm^2: the hand fills no harder
     force_spread: Annotated[float, 0, 1] = 0.18  # from line to line
     swell: Annotated[float, 0, 1] = 0.12  # along a line
     wobble: Annotated[float, 0, 1] = 0.05  # tips sideways

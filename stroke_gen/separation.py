@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .jit import kernel
-from .mixing import FEW, LAYERS, Mixtures, combine, wax
+from .mixing import LAYERS, Mixtures, combine, few, wax
 from .scene import Scene
 from .swatches import Swatches
 
@@ -128,7 +128,7 @@ def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict
             ground,
             turn == 0,
             left,
-            FEW if many else full,
+            few(len(full) - 1) if many else full,
             table,
             np.float32(dark_price),
             SHARP,

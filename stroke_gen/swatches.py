@@ -42,6 +42,23 @@ class Swatches:
         """OKLab L (k,) of each crayon laid heavily on the bare paper."""
         return oklab(self.over(self.paper))[:, -1, 0]
 
+    def upto(self, hardest: float) -> "Swatches":
+        """The table of a hand that presses no harder than so many N/mm^2."""
+        n = max(2, int((self.pressures <= hardest + 1e-6).sum()))
+        return Swatches(
+            self.names,
+            self.pressures[:n],
+            np.ascontiguousarray(self.a[:, :, :n]),
+            np.ascontiguousarray(self.b[:, :, :n]),
+            np.ascontiguousarray(self.grain[:, :n]),
+            self.paper,
+        )
+
+    def masstone(self) -> Floats:
+        """OKLab (k, 3) of each crayon laid well, but not burnished, on the bare paper."""
+        p = min(int(np.searchsorted(self.pressures, 0.38)), len(self.pressures) - 1)
+        return oklab(self.over(self.paper))[:, p]
+
     def only(self, chosen: list[int]) -> "Swatches":
         """The table of some of the crayons."""
         names = tuple(self.names[i] for i in chosen)
