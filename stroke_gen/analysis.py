@@ -159,7 +159,7 @@ def _toe(lightness: Floats, low: float, darkest: float) -> Floats:
     ).astype(np.float32)
 
 
-def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
+def tone_map(lab: Floats, swatches: Swatches, style: Style, tip: float = 5) -> Floats:
     """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in
     order.
     """
@@ -167,9 +167,17 @@ def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
     given = np.append(swatches.lightness(), oklab(swatches.paper)[0])
     darkest, lightest = float(given.min()), float(given.max())
     out = lab.copy()
-    out[..., 0] = np.minimum(
-        _toe(lab[..., 0], float(np.percentile(lab[..., 0], 0.5)), darkest), lightest
-    )
+    light = lab[..., 0]
+    low, high = np.percentile(light, (0.5, 98)).tolist()
+    high = max(high, low + 0.9*(lightest-darkest))
+    import os
+    A=float(os.environ.get('OPEN','.5')); K=float(os.environ.get('LOCAL','.3'))
+    base = cv2.ximgproc.guidedFilter(light, light, max(2, round(4*tip)), 0.004)
+    def curve(x):
+        toe = _toe(x, low, darkest)
+        straight = darkest + (x - low) * (lightest - darkest) / max(high - low, 1e-3) if low < darkest else x
+        return (1-A)*toe + A*straight
+    out[..., 0] = np.clip(curve(base) + (1+K)*(curve(light) - curve(base)), darkest, lightest)
     out[..., 0] += 4 * style.lift * out[..., 0] * (1 - out[..., 0])
     chroma = np.hypot(lab[..., 1], lab[..., 2])
     white = np.clip((out[..., 0] - WHITE) / (lightest - WHITE - 0.03), 0, 1) * np.clip(

@@ -59,7 +59,7 @@ def read(
     cell_mm = max(width_mm, height_mm) / analysis.WORK_LONG
     tip = style.tip_mm / cell_mm
     seen = analysis.unframed(analysis.fit(photo, analysis.work_shape(width_mm, height_mm)))
-    lab = analysis.tone_map(oklab(seen), swatches, style)
+    lab = analysis.tone_map(oklab(seen), swatches, style, tip)
     target = from_oklab(lab)
     detail = pool.submit(lambda: analysis.detail(lab, tip))
     natural = oklab(seen)
