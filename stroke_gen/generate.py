@@ -31,7 +31,10 @@ from .swatches import Swatches, firmness
 
 Floats = NDArray[np.float32]
 CROSS = (0, -1, 1, -2)  # turns of the direction from layer to layer, in `cross`
+SPARED = 0.7  # of the pressure, in the whites of eyes and in teeth
 SUBJECT = 0.5  # care from which the finer tip is taken
+FINEST = 0.35  # usual tips
+ACROSS = 45.0  # strokes across a subject at least: a small one takes a finer tip
 Draw = Callable[[list[Stroke]], None]
 Look = Callable[[tuple[int, int]], Floats]
 Stage = Callable[[Floats], list[Stroke]]
@@ -106,7 +109,7 @@ def _stages(
             continue
         for turn in range(LAYERS) if coat.kind == "fill" else (None,):
             yield partial(
-                _fill, plan, inside=inside * (1 - white), coat=coat, turn=turn, style=style, rng=rng
+                _fill, plan, inside=inside * (1 - SPARED * white), coat=coat, turn=turn, style=style, rng=rng
             )
     yield faces
     yield lines
@@ -140,9 +143,11 @@ def _fill(
     )
     gaps = (1 + style.open * (1 - seen.care)).astype(np.float32)
     careful = seen.care > SUBJECT
+    extent_mm = seen.cell_mm * float(np.sqrt(np.count_nonzero(careful)))
+    fine = max(FINEST, min(coat.fine, extent_mm / (ACROSS * style.tip_mm)))
     parts = []
     for k in sorted(wants, key=lambda k: -plan.swatches.lightness()[k]):
-        for factor, where in ((coat.tip, ~careful), (coat.fine, careful)):
+        for factor, where in ((coat.tip, ~careful), (fine, careful)):
             want = np.where(where, wants[k] * inside, 0).astype(np.float32)
             if want.any():
                 parts.append((k, factor, want))

@@ -27,6 +27,7 @@ SAMPLES = 24  # colours by which a surface is judged
 GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
+HUE_PRICE = 0.1  # for another hue than the surface's, times how far (see `chord`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
 # for a crayon darker than the surface's darkest, times the difference of lightness
@@ -261,6 +262,7 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
+    price += HUE_PRICE * chord(hue[None], mean[:, None, 1:])
     price += GREY_PRICE * np.outer(np.maximum(chroma - 0.025, 0), greyness(heavy))
     loud = np.linalg.norm(hue, axis=1)
     price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
@@ -298,6 +300,13 @@ def clash(one: Floats, other: Floats) -> Floats:
     dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
     both = np.sqrt((one**2).sum(-1) * (other**2).sum(-1))
     return np.asarray(np.sqrt(np.maximum(0.72 * both - dot, 0)))
+
+
+def chord(one: Floats, other: Floats) -> Floats:
+    """How far apart two hues (..., 2) in a and b are, for the chroma both have: 0 for the same."""
+    dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
+    both = np.sqrt((one**2).sum(-1) * (other**2).sum(-1))
+    return np.asarray(np.sqrt(np.maximum(2 * (both - dot), 0)))
 
 
 def greyness(colours: Floats) -> Floats:
