@@ -36,6 +36,7 @@ BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
 DARK_BODY = 0.46  # OKLab L below which skin and hair are dark
 WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
+GROUND_SAY = 0.15  # of the ground in the choice of the box; where care is due, 1 more
 BEAM = 3  # mixtures of each length that are tried with one crayon more
 
 
@@ -188,7 +189,8 @@ def _try(sample, mixtures, extra, allowed, pressures, wax, cost):  # type: ignor
 
 def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -> Mixtures:
     """A mixture for each family of surfaces, of at most `most` crayons in all."""
-    sample, size = _samples(seen.guide.lab, seen.family, rng)
+    sample = _samples(seen.guide.lab, seen.family, rng)
+    say = np.bincount(seen.family.ravel(), (GROUND_SAY + seen.care).ravel()) / seen.care.size
     order = np.argsort(-swatches.lightness(), kind="stable")
     skin, hair = (np.bincount(seen.family.ravel(), m.ravel()) / np.bincount(seen.family.ravel())
                   for m in (seen.skin, seen.hair))  # fmt: skip
@@ -212,7 +214,7 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     double = np.broadcast_to(pairs[None], (len(sample), *pairs.shape)).copy()
     two = tried(double, every, full)
     allowed = _box(
-        np.hstack([one, two]), [[int(k)] for k in order] + pairs.tolist(), size, number, most
+        np.hstack([one, two]), [[int(k)] for k in order] + pairs.tolist(), say, number, most
     )
     best = np.full((len(sample), LAYERS), -1, np.int64)
     least = np.full(len(sample), np.inf, np.float32)
@@ -244,15 +246,15 @@ def few(number: int) -> Ints:
 
 def _samples(
     lab: Floats, label: NDArray[np.int32], rng: np.random.Generator
-) -> tuple[Floats, NDArray[np.float64]]:
-    """Colours (surfaces, 3, SAMPLES) of each surface, and its share of the sheet."""
+) -> Floats:
+    """Colours (surfaces, 3, SAMPLES) of each surface."""
     flat, colours = label.ravel(), lab.reshape(-1, 3)
     where = np.argsort(flat, kind="stable")
     first = np.searchsorted(flat[where], np.arange(int(flat.max()) + 2))
     chosen = np.stack(
         [where[a + (rng.random(SAMPLES) * (b - a)).astype(np.int64)] for a, b in pairwise(first)]
     )
-    return np.ascontiguousarray(colours[chosen].swapaxes(1, 2)), np.diff(first) / flat.size
+    return np.ascontiguousarray(colours[chosen].swapaxes(1, 2))
 
 
 def prices(sample: Floats, swatches: Swatches) -> Floats:
@@ -318,7 +320,7 @@ def greyness(colours: Floats) -> Floats:
 
 
 def _box(
-    cost: Floats, mixtures: list[list[int]], size: NDArray[np.float64], number: int, most: int
+    cost: Floats, mixtures: list[list[int]], say: NDArray[np.float64], number: int, most: int
 ) -> NDArray[np.bool_]:
     """Which crayons to take: starting from all, put back the one least missed until `most` remain
     in use.
@@ -335,7 +337,7 @@ def _box(
             return np.isin(np.arange(number), used)
         allowed[:] = False
         allowed[used] = True
-        missed = [(np.where(holds[:, k], 9, now).min(1) * size).sum() for k in used]
+        missed = [(np.where(holds[:, k], 9, now).min(1) * say).sum() for k in used]
         allowed[used[int(np.argmin(missed))]] = False
 
 

@@ -69,7 +69,7 @@ def read(
     calm = oklab(analysis.calmed(target, max(1, round(CALM * tip))))
     structure = pool.submit(lambda: analysis.structure(calm, tip))
     label = surfaces.part(calm, care, subject.mask + skin, tip, style.merge)
-    family = surfaces.families(label, calm, skin + 2 * hair, style.merge)[label].astype(np.int32)
+    family = surfaces.families(label, calm, skin + 2 * hair + 0.5 * subject.mask, style.merge)[label].astype(np.int32)
     field = structure.result()
     tangent = surfaces.directions(field, label, care, tip, style.wrist_deg, style.wrist)
     coherence = np.hypot(field[..., 0], field[..., 1]) / (field[..., 2] + 1e-6)
