@@ -32,7 +32,7 @@ LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
 CURLED = 0.6  # radians a width by which worms along fringes turn: they say nothing
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
 TAPER = 4.0  # tips over which a line begins and ends
-SMALL = 45.0  # widths across, of a thing in which no lines are drawn
+SMALL = 60.0  # widths across, of a thing in which no lines are drawn
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
 

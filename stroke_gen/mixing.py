@@ -27,7 +27,7 @@ SAMPLES = 24  # colours by which a surface is judged
 GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
-HUE_PRICE = 0.1  # for another hue than the surface's, times how far (see `chord`)
+HUE_PRICE = 0.2  # for another hue than the surface's, times how far (see `chord`)
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
 # for a crayon darker than the surface's darkest, times the difference of lightness
@@ -36,7 +36,7 @@ BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
 DARK_BODY = 0.46  # OKLab L below which skin and hair are dark
 WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
-GROUND_SAY = 0.15  # of the ground in the choice of the box; where care is due, 1 more
+GROUND_SAY = 0.4  # of the ground in the choice of the box; where care is due, 1 more
 BEAM = 3  # mixtures of each length that are tried with one crayon more
 
 
