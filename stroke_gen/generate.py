@@ -20,6 +20,7 @@ from . import (
     separation,
     touches,
 )
+from .alike import be_plain
 from .analysis import blur
 from .drawing import Stroke, Tip
 from .mixing import LAYERS
@@ -59,7 +60,7 @@ def generate(
     """
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads, initializer=be_plain) as pool:
         seen = scene.read(photo, subject, width_mm, height_mm, swatches, style, focus, pool)
         plan = _plan(seen, swatches, style, rng, pool)
         tip = style.tip_mm / seen.cell_mm

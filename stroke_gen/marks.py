@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .alike import norm
 from .colour import oklab
 from .drawing import Stroke, Tip
 from .swatches import Swatches
@@ -129,7 +130,7 @@ def spiral(centre: Floats, outer: float, inner: float, gap: float) -> Floats:
 
 
 def unit(v: Floats) -> Floats:
-    return np.asarray(v / (np.linalg.norm(v) + 1e-9), np.float32)
+    return np.asarray(v / (norm(v) + 1e-9), np.float32)
 
 
 def strokes(

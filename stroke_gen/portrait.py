@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import eyes, marks, subject
+from .alike import norm
 from .drawing import Stroke
 from .eyes import AWAY, Eye
 from .marks import STEP, Floats, Mark, curve, f32, sampled, settled, smooth, spiral, taper, unit
@@ -96,7 +97,7 @@ def parted(face: Face) -> bool:
     """Whether the lips are open."""
     top, bottom = face.path(subject.MOUTH_TOP), face.path(subject.MOUTH_BOTTOM)
     gap = float(np.linalg.norm(top - bottom, axis=1).max())
-    return gap > max(0.1 * float(np.linalg.norm(top[0] - top[-1])), 0.08 * face.eye_width, 1.8)
+    return gap > max(0.1 * norm(top[0] - top[-1]), 0.08 * face.eye_width, 1.8)
 
 
 class _Sitter:
@@ -194,8 +195,8 @@ class _Sitter:
 
     def lids(self, top: Floats, bottom: Floats) -> None:
         wide, high = (
-            float(np.linalg.norm(top[0] - top[-1])),
-            float(np.linalg.norm(top[4] - bottom[4])),
+            norm(top[0] - top[-1]),
+            norm(top[4] - bottom[4]),
         )
         if wide < AWAY * self.eye:  # turned away
             self.line(top, "lid", 0.1, 0.2, 3)
@@ -267,8 +268,8 @@ class _Sitter:
         if self.eye < 14:
             self.line(middle, "brow", 0.1, 0.25, 2.5, 1.2, (0.15, 0.5))
             return
-        length = float(np.linalg.norm(middle[0] - middle[-1]))
-        up = unit(top.mean(0) - bottom.mean(0)) * np.linalg.norm(top[2] - bottom[2])
+        length = norm(middle[0] - middle[-1])
+        up = unit(top.mean(0) - bottom.mean(0)) * norm(top[2] - bottom[2])
         low, high = curve(bottom - 0.3 * up, 0.3), curve(top + 0.25 * up, 0.3)
         lid = np.concatenate([bottom, self.face.path(subject.UPPER_LID[side])])
         bare = self.light[subject.polygons([lid], self.light.shape) > 0.5]
@@ -409,7 +410,7 @@ class _Sitter:
                 len(path), 0.2, 0.3
             )
             colour = np.median(sampled(self.lab, path), 0) - f32([0.1, 0, 0])
-            tint = np.linalg.norm(colour[1:] - self.skin[1:] * max(0.5, colour[0] / self.skin[0]))
+            tint = norm(colour[1:] - self.skin[1:] * max(0.5, colour[0] / self.skin[0]))
             self.add(path, pressure, colour, self.fine, "frame" if tint > 0.06 else "trace")
 
     def blots(self) -> None:
@@ -419,7 +420,7 @@ class _Sitter:
             top, bottom = (
                 self.face.path(lid[side]) for lid in (subject.UPPER_LID, subject.LOWER_LID)
             )
-            if np.linalg.norm(top[0] - top[-1]) > AWAY * self.eye:
+            if norm(top[0] - top[-1]) > AWAY * self.eye:
                 self.line(0.5 * (top + bottom), "lid", 0.3, 0.9, 2, 1.6, (0.1, 0.1), colour=dark)
         lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
         self.line(lips, "mouth", 0.15, 0.6, 2, 1.4, (0.1, 0.1), colour=dark)

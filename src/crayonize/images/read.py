@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from stroke_gen.alike import plain_opencv
+
 from ..light import area
 from ..machine import memory
 from .icc import lineariser
@@ -82,6 +84,7 @@ class Photo:
     _scan: Callable[[], Scan]
     exif: Image.Exif | None = None
 
+    @plain_opencv()
     def light(
         self, max_side: int | None = None, ground: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ) -> NDArray[np.float32]:
