@@ -68,7 +68,8 @@ class Photo:
     nothing); both once its light has been taken.
     """
 
-    def __init__(self, name: str, picture: Stored) -> None:
+    def __init__(self, source: Source, name: str, picture: Stored) -> None:
+        self.source = source
         self.width, self.height, self.decoding = picture.width, picture.height, picture.decoding
         self.exif: Image.Exif | None = None
         self.warning = ""
@@ -99,18 +100,18 @@ def open_photo(source: Source | Photo) -> Iterator[Photo]:
         with _named("array"):
             scan = scan_array(source)
         found = Decoded(scan, None, "")
-        yield Photo("array", Stored(scan.width, scan.height, 0, lambda: found))
+        yield Photo(source, "array", Stored(scan.width, scan.height, 0, lambda: found))
     elif isinstance(source, Image.Image):
         with _named("picture"):
             picture = of_picture(source, None)
-        yield Photo("picture", picture)
+        yield Photo(source, "picture", picture)
     else:
         with _named(shown(source)):
             file = _opened(source)
         with file:
             with _named(shown(source)):
                 picture = stored(file)
-            yield Photo(shown(source), picture)
+            yield Photo(source, shown(source), picture)
 
 
 def _light(
