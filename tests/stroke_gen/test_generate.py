@@ -96,14 +96,12 @@ def nobody(photo):
 
 def strokes_for(photo, style="artist", seed=0, table=TABLE, threads=2, who=None, **options):
     style = load_style(style) if isinstance(style, str) else style
-    width, height = sheet_mm(photo)
-    sheet = FlatSheet(width, height, table)
+    sheet = FlatSheet(*sheet_mm(photo), table)
     hand = {"draw": sheet.draw, "look": sheet.look}
     return generate(
         photo,
         who or nobody(photo),
-        width,
-        height,
+        sheet_mm(photo),
         table,
         style,
         seed,
@@ -125,7 +123,7 @@ def in_stages(photo, style="artist", **options):
     generate(
         photo,
         nobody(photo),
-        *sheet_mm(photo),
+        sheet_mm(photo),
         TABLE,
         style,
         0,
