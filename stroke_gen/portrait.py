@@ -16,7 +16,7 @@ from . import eyes, marks, subject
 from .alike import norm
 from .drawing import Stroke
 from .eyes import AWAY, Eye
-from .marks import STEP, Floats, Mark, curve, f32, sampled, settled, smooth, spiral, taper, unit
+from .marks import STEP, Floats, Mark, curve, envelope, f32, sampled, settled, smooth, spiral, unit
 from .params import Style
 from .subject import Face, Subject
 from .swatches import Swatches
@@ -158,7 +158,7 @@ class _Sitter:
         """A line near points, pressed by `floor` and by `gain` times the darkness it finds."""
         path = settled(curve(points), self.dark, max(0.8, reach * self.eye))
         found = smooth(np.maximum(sampled(self.dark, path), 0), 5)
-        pressure = np.clip(floor + gain * found, 0, 1) * taper(len(path), *ends)
+        pressure = np.clip(floor + gain * found, 0, 1) * envelope(len(path), *ends)
         if colour is None:
             seen = sampled(self.lab, path)
             colour = np.median(seen[seen[:, 0] <= np.median(seen[:, 0])], 0)
@@ -178,7 +178,7 @@ class _Sitter:
             t = (i + 0.5 + self.rng.uniform(-0.15, 0.15)) / rows
             path = curve((1 - t) * top + t * bottom)
             path = path[:: 1 if i % 2 else -1]
-            self.add(path, pressed(path) * taper(len(path), 0.1, 0.2), colour, width, role)
+            self.add(path, pressed(path) * envelope(len(path), 0.1, 0.2), colour, width, role)
 
     # -- features
 
@@ -295,7 +295,7 @@ class _Sitter:
         hairs = ((1 - t) ** 2 * root + 2 * t * (1 - t) * bend + t * t * tip).astype(np.float32)
         found = sampled(dark, hairs.reshape(-1, 2)).reshape(len(t), number)
         level = min(1.0, 0.45 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
-        pressure = level * taper(len(t), 0.2, 0.7)[:, None]
+        pressure = level * envelope(len(t), 0.2, 0.7)[:, None]
         for i in np.argsort(u):
             self.add(hairs[:, i], pressure[:, i], colour, width, "brow")
 
@@ -380,7 +380,7 @@ class _Sitter:
             around = dip[i - apart : i + apart + 1]
             if dip[i] == around.max() and dip[i] > 0.012 and light[i] > teeth - 0.2:
                 path = curve(np.stack([upper[i], 0.25 * upper[i] + 0.75 * lower[at[i]]]))
-                pressure = min(0.4, 0.15 + 6 * float(dip[i])) * taper(len(path), 0.1, 0.6)
+                pressure = min(0.4, 0.15 + 6 * float(dip[i])) * envelope(len(path), 0.1, 0.6)
                 self.add(path, pressure, f32([0.6, 0, 0.02]), 0.6 * self.fine, "white")
 
     def contours(self) -> None:
@@ -406,7 +406,7 @@ class _Sitter:
             if len(chain) < 0.5 * self.eye:
                 continue
             path = curve(chain[:: max(1, len(chain) // 16)])
-            pressure = np.clip(4.5 * smooth(sampled(dark, path), 5), 0, 0.9) * taper(
+            pressure = np.clip(4.5 * smooth(sampled(dark, path), 5), 0, 0.9) * envelope(
                 len(path), 0.2, 0.3
             )
             colour = np.median(sampled(self.lab, path), 0) - f32([0.1, 0, 0])

@@ -44,21 +44,20 @@ class Scene:
 def read(
     photo: Floats,
     subject: Subject,
-    width_mm: float,
-    height_mm: float,
+    sheet_mm: tuple[float, float],
     swatches: Swatches,
     style: Style,
     focus: Sequence[Box],
     pool: Executor,
 ) -> Scene:
-    """See a photo in linear light (h, w, 3) for a sheet of the given size, as far as these crayons
-    can draw it.
+    """See a photo in linear light (h, w, 3) for a sheet of this width and height, as far as these
+    crayons can draw it.
 
     focus: boxes (x, y, w, h) in fractions of the picture that deserve care.
     """
-    cell_mm = max(width_mm, height_mm) / analysis.WORK_LONG
+    cell_mm = max(sheet_mm) / analysis.WORK_LONG
     tip = style.tip_mm / cell_mm
-    seen = analysis.unframed(analysis.fit(photo, analysis.work_shape(width_mm, height_mm)))
+    seen = analysis.unframed(analysis.fit(photo, analysis.work_shape(*sheet_mm)))
     lab = analysis.tone_map(oklab(seen), swatches, style)
     target = from_oklab(lab)
     detail = pool.submit(lambda: analysis.detail(lab, tip))

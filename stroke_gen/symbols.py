@@ -6,7 +6,7 @@ import numpy as np
 
 from . import eyes, subject
 from .alike import norm
-from .marks import Floats, Mark, curve, f32, spiral, taper, unit
+from .marks import Floats, Mark, curve, envelope, f32, spiral, unit
 from .subject import Face
 
 
@@ -41,7 +41,7 @@ class _Child:
         line = line + shaky * np.stack(
             [np.interp(at, np.arange(len(knots)), k) for k in knots.T], 1
         )
-        press = np.clip(0.8 + 0.1 * self.rng.standard_normal(), 0.6, 1) * taper(
+        press = np.clip(0.8 + 0.1 * self.rng.standard_normal(), 0.6, 1) * envelope(
             len(line), 0.05, 0.1
         )
         self.made.append(Mark(f32(line), f32(press), f32(colour), width * self.width, "symbol"))

@@ -177,7 +177,7 @@ def sketch(
         done += 1
 
     strokes = generator.generate(
-        photo, who, width_mm, height_mm, table, style, settings.seed,
+        photo, who, (width_mm, height_mm), table, style, settings.seed,
         draw=draw, look=stand.seen, threads=stand.threads, focus=settings.focus,
     )  # fmt: skip
     drawing = Drawing(

@@ -1,4 +1,4 @@
-"""The conductor of a batch: plan, lock, draw, account."""
+"""The conductor of a batch: plan, lock, draw, account; and what Ctrl-C does to it."""
 
 import signal
 from collections.abc import Iterator, Sequence
