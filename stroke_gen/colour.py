@@ -7,6 +7,8 @@ OSA-UCS, as quoted by CSS Color 4, section 20.5), so grey is not taken for teal.
 import numpy as np
 from numpy.typing import NDArray
 
+from .alike import times
+
 CHROMA = 2.0  # weight of a and b
 TO_LMS = np.array(
     [[0.4122214708, 0.5363325363, 0.0514459929],
@@ -17,20 +19,21 @@ TO_LAB = np.array(
      [1.9779984951 * CHROMA, -2.4285922050 * CHROMA, 0.4505937099 * CHROMA],
      [0.0259040371 * CHROMA, 0.7827717662 * CHROMA, -0.8086757660 * CHROMA]],
     np.float32)  # fmt: skip
+_FROM_LMS, _FROM_LAB = (
+    np.linalg.inv(m.astype(np.float64)).astype(np.float32) for m in (TO_LMS, TO_LAB)
+)
 
 
 def oklab(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     """OKLab (..., 3) of linear RGB (..., 3), a and b doubled; L is 0..1."""
-    lms = np.cbrt(np.maximum(linear, 0).astype(np.float32) @ TO_LMS.T)
-    return np.asarray(lms @ TO_LAB.T, np.float32)
+    lms = np.cbrt(times(np.maximum(linear, 0).astype(np.float32), TO_LMS))
+    return np.asarray(times(lms, TO_LAB), np.float32)
 
 
 def from_oklab(lab: NDArray[np.float32]) -> NDArray[np.float32]:
     """Linear RGB in [0, 1] of OKLab with a and b doubled; out of gamut is clipped."""
-    lms = lab @ np.linalg.inv(TO_LAB.astype(np.float64)).T.astype(np.float32)
-    return np.clip(
-        lms**3 @ np.linalg.inv(TO_LMS.astype(np.float64)).T.astype(np.float32), 0, 1
-    ).astype(np.float32)
+    lms = times(lab, _FROM_LAB)
+    return np.clip(times(lms**3, _FROM_LMS), 0, 1).astype(np.float32)
 
 
 def cube_root(x):  # type: ignore[no-untyped-def]

@@ -31,7 +31,7 @@ DARKER = 0.14  # OKLab L by which a line is darker than what it bounds
 LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
 CURLED = 0.6  # radians a width by which worms along fringes turn: they say nothing
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
-TAPER = 4.0  # tips over which a line begins and ends
+LINE_TAPER = 4.0  # tips over which an outline begins and ends
 SMALL = 60.0  # widths across, of a thing in which no lines are drawn
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
@@ -88,7 +88,9 @@ def outlines(
             some.points, level.astype(np.float32), np.zeros(len(level), np.int32), some.first
         )
         for _ in range(style.search):
-            strokes += hand.draw(paths, scene.cell_mm, box.names[k], tip, "line", style, rng, TAPER)
+            strokes += hand.draw(
+                paths, scene.cell_mm, box.names[k], tip, "line", style, rng, LINE_TAPER
+            )
     return strokes
 
 

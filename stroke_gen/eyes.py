@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import subject
+from .alike import norm
 from .marks import Floats, f32, sampled, unit
 from .subject import Face
 
@@ -51,8 +52,8 @@ def seen(face: Face, lab: Floats) -> Eyes:
 def _eye(face: Face, lab: Floats, side: int) -> Eye | None:
     """What an eye shows between its lids; None if it is closed or turned away."""
     top, bottom = (face.path(lid[side]) for lid in (subject.UPPER_LID, subject.LOWER_LID))
-    wide = float(np.linalg.norm(top[0] - top[-1]))
-    if wide < AWAY * face.eye_width or np.linalg.norm(top[4] - bottom[4]) < CLOSED * wide:
+    wide = norm(top[0] - top[-1])
+    if wide < AWAY * face.eye_width or norm(top[4] - bottom[4]) < CLOSED * wide:
         return None
     ring = np.concatenate([top, bottom[::-1]])
     inside = subject.polygons([ring], (lab.shape[0], lab.shape[1]))
@@ -97,7 +98,7 @@ def _disc(points: Floats, level: Floats, opening: Floats, wide: float) -> tuple[
     best = (-np.inf, middle, 0.2)
     for radius in (0.18, 0.2, 0.22, 0.24):
         disc, ring = far < radius, (far > 1.1 * radius) & (far < 1.6 * radius)
-        means = [(part @ level) / np.maximum(part.sum(1), 1) for part in (ring, disc)]
+        means = [(part * level).sum(1) / np.maximum(part.sum(1), 1) for part in (ring, disc)]
         worth = means[0] - means[1] - (0.4 * shares**2 + 2 * lifts**2)[:, 0]
         worth[(disc.sum(1) < 3) | (ring.sum(1) < 3)] = -np.inf
         best = max(

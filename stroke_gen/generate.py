@@ -20,6 +20,7 @@ from . import (
     separation,
     touches,
 )
+from .alike import be_plain
 from .analysis import blur
 from .drawing import Stroke, Tip
 from .mixing import LAYERS
@@ -43,8 +44,7 @@ Stage = Callable[[Floats], list[Stroke]]
 def generate(
     photo: Floats,
     subject: Subject,
-    width_mm: float,
-    height_mm: float,
+    sheet_mm: tuple[float, float],
     swatches: Swatches,
     style: Style,
     seed: int,
@@ -55,22 +55,22 @@ def generate(
     focus: Sequence[tuple[float, float, float, float]] = (),
 ) -> list[Stroke]:
     """Strokes for a photo in linear light (h, w, 3) of a subject (see `subject.see`), in drawing
-    order.
+    order, on a sheet of width and height `sheet_mm`.
 
     draw(strokes) draws further strokes on the open sheet; look(shape) returns what it shows now, as
     linear light on a grid of `shape`: the generator steps back and looks before each coat.
     """
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads, initializer=be_plain) as pool:
         swatches = swatches.upto(style.hardest)
-        seen = scene.read(photo, subject, width_mm, height_mm, swatches, style, focus, pool)
+        seen = scene.read(photo, subject, sheet_mm, swatches, style, focus, pool)
         plan = _plan(seen, swatches, style, rng, pool)
         tip = style.tip_mm / seen.cell_mm
         inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, tip, rng)
         inside *= margin.faded(seen.care, style.fade, tip, style.wrist_deg, rng)
         for stage in _stages(plan, swatches, inside, style, rng):
-            fresh = hand.within(stage(look(seen.label.shape)), width_mm, height_mm)
+            fresh = hand.within(stage(look(seen.label.shape)), sheet_mm)
             draw(fresh)
             strokes += fresh
     return strokes

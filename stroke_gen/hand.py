@@ -16,7 +16,9 @@ from .jit import inner_kernel, lean_kernel
 from .params import Style
 
 Floats = NDArray[np.float32]
-TAPER = 1.2  # tips over which a line of hatching begins and ends
+HATCH_TAPER = 1.2  # tips over which a stroke of hatching begins and ends
+TOUCH = 0.4  # share of the pressure at a stroke's very ends; it rises to all of it over the taper
+FORCES_N = (0.02, 60.0)  # what a hand presses with, at least and at most
 TURN_DIP = 0.15  # share of the pressure lost where a zigzag turns
 TABLE = 8192  # random numbers that slow noise walks through
 
@@ -41,7 +43,7 @@ def draw(
     note: str,
     style: Style,
     rng: np.random.Generator,
-    taper: float = TAPER,
+    taper: float = HATCH_TAPER,
 ) -> list[Stroke]:
     """Strokes along paths given in units of `scale_mm`; taper: tips over which they begin and
     end.
@@ -69,20 +71,20 @@ def draw(
         5 * width,
         taper * width,
         TURN_DIP,
-        0.785 * width**2 * style.press,
+        tip.area_mm2 * style.press,
         force_n,
     )
     bounds = paths.first.tolist()
     return [Stroke(xy[a:b], force_n[a:b], crayon, tip, note) for a, b in pairwise(bounds)]
 
 
-def within(strokes: list[Stroke], width_mm: float, height_mm: float) -> list[Stroke]:
+def within(strokes: list[Stroke], sheet_mm: tuple[float, float]) -> list[Stroke]:
     """Strokes held back where they leave a sheet by more than its own size, which a drawing's file
     forbids.
 
     Only a thread of a sheet is so narrow that the hand slips that far.
     """
-    size = np.array([width_mm, height_mm])
+    size = np.array(sheet_mm)
     low, high = np.round(-size, 3).astype(np.float32), np.round(2 * size, 3).astype(np.float32)
     if not strokes or _all_within(np.concatenate([s.path_mm for s in strokes]), low, high):
         return strokes
@@ -170,5 +172,7 @@ def _press(along, pressure, leg, first, firmness, swell, swelling, wave, taper, 
                 force *= 1 - dip
             elif _turns(leg, i + 1, i + 2, a, b) or _turns(leg, i - 2, i - 1, a, b):
                 force *= 1 - dip / 2
-            force *= min(0.4 + 0.6 * min(along[i], along[b] - along[i]) / taper, 1.0)
-            force_n[i] = np.floor(min(max(force * area, 0.02), 60.0) * 1000 + 0.5) / 1000
+            from_end = min(along[i], along[b] - along[i])
+            force *= min(TOUCH + (1 - TOUCH) * from_end / taper, 1.0)
+            newton = min(max(force * area, FORCES_N[0]), FORCES_N[1])
+            force_n[i] = np.floor(newton * 1000 + 0.5) / 1000

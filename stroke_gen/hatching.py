@@ -121,57 +121,14 @@ def _hatch(want, gaps, tangent, coherence, seeds, luck, spacing,  # type: ignore
         start = used
         for leg in range(most):
             if leg == 0:  # through the seed both ways
-                n = _leg(
-                    x,
-                    y,
-                    tx,
-                    ty,
-                    want,
-                    tangent,
-                    stamp,
-                    fine,
-                    step,
-                    own_reach * np.float32(0.5),
-                    gap,
-                    sharpest,
-                    forth,
-                )
-                m = _leg(
-                    x,
-                    y,
-                    -tx,
-                    -ty,
-                    want,
-                    tangent,
-                    stamp,
-                    fine,
-                    step,
-                    own_reach * np.float32(0.5),
-                    gap,
-                    sharpest,
-                    back,
-                )
+                ahead = own_reach * np.float32(0.5)
+                behind = ahead
             else:  # one spacing beside the last end: a little further on, then back
-                n = _leg(
-                    x,
-                    y,
-                    tx,
-                    ty,
-                    want,
-                    tangent,
-                    stamp,
-                    fine,
-                    step,
-                    spacing * np.float32(1.5),
-                    gap,
-                    sharpest,
-                    forth,
-                )
-                ragged = own_reach * (np.float32(0.85) + np.float32(0.3) * luck[dice % luck.size])
+                ahead = spacing * np.float32(1.5)
+                behind = own_reach * (np.float32(0.85) + np.float32(0.3) * luck[dice % luck.size])
                 dice += 1
-                m = _leg(
-                    x, y, -tx, -ty, want, tangent, stamp, fine, step, ragged, gap, sharpest, back
-                )
+            n = _leg(x, y, tx, ty, want, tangent, stamp, fine, step, ahead, gap, sharpest, forth)
+            m = _leg(x, y, -tx, -ty, want, tangent, stamp, fine, step, behind, gap, sharpest, back)
             if (n + m) * step < shortest or used + n + m + 1 >= points.shape[0]:
                 break
             begin = used

@@ -11,8 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .alike import norm
 from .colour import oklab
 from .drawing import Stroke, Tip
+from .hand import FORCES_N
 from .swatches import Swatches
 
 Floats = NDArray[Any]
@@ -112,8 +114,10 @@ def smooth(values: Floats, width: int) -> Floats:
     return cv2.blur(values.reshape(1, -1), (width | 1, 1), borderType=cv2.BORDER_REPLICATE).ravel()
 
 
-def taper(n: int, begin: float, end: float) -> Floats:
-    """How a line begins and lifts off, over these shares of its length."""
+def envelope(n: int, begin: float, end: float) -> Floats:
+    """How the pressure of a mark of n points rises and falls away, over these shares of its
+    length.
+    """
     t = np.linspace(0, 1, n)
     rise = np.clip(t / max(begin, 1e-3), 0, 1) * 0.75 + 0.25
     fall = np.clip((1 - t) / max(end, 1e-3), 0, 1) * 0.9 + 0.1
@@ -129,7 +133,7 @@ def spiral(centre: Floats, outer: float, inner: float, gap: float) -> Floats:
 
 
 def unit(v: Floats) -> Floats:
-    return np.asarray(v / (np.linalg.norm(v) + 1e-9), np.float32)
+    return np.asarray(v / (norm(v) + 1e-9), np.float32)
 
 
 def strokes(
@@ -148,8 +152,9 @@ def strokes(
         firm = np.interp(width, *FIRM) * (share * mark.pressure) ** DEPTH
         wobble = np.cumsum(rng.standard_normal(mark.path.shape), 0) / np.sqrt(len(mark.path))
         path = np.round((mark.path + WOBBLE * mark.width * wobble) * cell_mm, 3).astype(np.float32)
-        force = np.clip(np.round(firm * 0.785 * width**2, 3), 0.02, 60).astype(np.float32)
-        out.append(Stroke(path, force, swatches.names[k], Tip("sharp", round(width, 2)), mark.role))
+        tip = Tip("sharp", round(width, 2))
+        force = np.clip(np.round(firm * tip.area_mm2, 3), *FORCES_N).astype(np.float32)
+        out.append(Stroke(path, force, swatches.names[k], tip, mark.role))
     return out
 
 

@@ -2,10 +2,9 @@
 
 A person takes one to four crayons for a surface and lays each over the whole of it, with a pressure
 that follows the tone. For every surface the ordered mixture is sought that serves all of its
-colours at the least
-cost: distance seen from afar, grain, and the price of crayons that a careful hand leaves in the box
-(a hue that opposes the surface's, grey in a colour, black in the light). One box serves all
-surfaces.
+colours at the least cost: distance seen from afar, grain, and the price of crayons that a careful
+hand leaves in the box (a hue that opposes the surface's, grey in a colour, black in the light). One
+box serves all surfaces.
 """
 
 from dataclasses import dataclass

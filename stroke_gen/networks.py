@@ -14,6 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .alike import times
+
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 MODELS = Path(__file__).with_name("models")
@@ -149,12 +151,13 @@ def mesh(picture: Picture, box: Box) -> Floats | None:
         scale = MESH_SIDE / (AROUND * float((high - low).max()))
         c, s = scale * np.cos(tilt), scale * np.sin(tilt)
         turn = np.array([[c, s], [-s, c]])
-        move = MESH_SIDE / 2 - turn @ (low + high) / 2
+        move = MESH_SIDE / 2 - times(low + high, turn) / 2
         seen = cv2.warpAffine(picture, np.hstack([turn, move[:, None]]), (MESH_SIDE, MESH_SIDE))
         logit, found = _run("face_landmark", seen / np.float32(255), "conv2d_31", "conv2d_21")
         if logit.ravel()[0] < SURE * look:
             return None
-        points = (found.reshape(468, 3)[:, :2] - move) @ np.linalg.inv(turn).T
+        # back: the turn the other way round, over the square of its scale
+        points = times(found.reshape(468, 3)[:, :2] - move, turn.T) / (c * c + s * s)
         low, high, eyes = (
             points.min(0),
             points.max(0),

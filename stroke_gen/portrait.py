@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import eyes, marks, subject
+from .alike import norm
 from .drawing import Stroke
 from .eyes import AWAY, Eye
-from .marks import STEP, Floats, Mark, curve, f32, sampled, settled, smooth, spiral, taper, unit
+from .marks import STEP, Floats, Mark, curve, envelope, f32, sampled, settled, smooth, spiral, unit
 from .params import Style
 from .subject import Face, Subject
 from .swatches import Swatches
@@ -96,7 +97,7 @@ def parted(face: Face) -> bool:
     """Whether the lips are open."""
     top, bottom = face.path(subject.MOUTH_TOP), face.path(subject.MOUTH_BOTTOM)
     gap = float(np.linalg.norm(top - bottom, axis=1).max())
-    return gap > max(0.1 * float(np.linalg.norm(top[0] - top[-1])), 0.08 * face.eye_width, 1.8)
+    return gap > max(0.1 * norm(top[0] - top[-1]), 0.08 * face.eye_width, 1.8)
 
 
 class _Sitter:
@@ -157,7 +158,7 @@ class _Sitter:
         """A line near points, pressed by `floor` and by `gain` times the darkness it finds."""
         path = settled(curve(points), self.dark, max(0.8, reach * self.eye))
         found = smooth(np.maximum(sampled(self.dark, path), 0), 5)
-        pressure = np.clip(floor + gain * found, 0, 1) * taper(len(path), *ends)
+        pressure = np.clip(floor + gain * found, 0, 1) * envelope(len(path), *ends)
         if colour is None:
             seen = sampled(self.lab, path)
             colour = np.median(seen[seen[:, 0] <= np.median(seen[:, 0])], 0)
@@ -177,7 +178,7 @@ class _Sitter:
             t = (i + 0.5 + self.rng.uniform(-0.15, 0.15)) / rows
             path = curve((1 - t) * top + t * bottom)
             path = path[:: 1 if i % 2 else -1]
-            self.add(path, pressed(path) * taper(len(path), 0.1, 0.2), colour, width, role)
+            self.add(path, pressed(path) * envelope(len(path), 0.1, 0.2), colour, width, role)
 
     # -- features
 
@@ -194,8 +195,8 @@ class _Sitter:
 
     def lids(self, top: Floats, bottom: Floats) -> None:
         wide, high = (
-            float(np.linalg.norm(top[0] - top[-1])),
-            float(np.linalg.norm(top[4] - bottom[4])),
+            norm(top[0] - top[-1]),
+            norm(top[4] - bottom[4]),
         )
         if wide < AWAY * self.eye:  # turned away
             self.line(top, "lid", 0.1, 0.2, 3)
@@ -267,8 +268,8 @@ class _Sitter:
         if self.eye < 14:
             self.line(middle, "brow", 0.1, 0.25, 2.5, 1.2, (0.15, 0.5))
             return
-        length = float(np.linalg.norm(middle[0] - middle[-1]))
-        up = unit(top.mean(0) - bottom.mean(0)) * np.linalg.norm(top[2] - bottom[2])
+        length = norm(middle[0] - middle[-1])
+        up = unit(top.mean(0) - bottom.mean(0)) * norm(top[2] - bottom[2])
         low, high = curve(bottom - 0.3 * up, 0.3), curve(top + 0.25 * up, 0.3)
         lid = np.concatenate([bottom, self.face.path(subject.UPPER_LID[side])])
         bare = self.light[subject.polygons([lid], self.light.shape) > 0.5]
@@ -294,7 +295,7 @@ class _Sitter:
         hairs = ((1 - t) ** 2 * root + 2 * t * (1 - t) * bend + t * t * tip).astype(np.float32)
         found = sampled(dark, hairs.reshape(-1, 2)).reshape(len(t), number)
         level = min(1.0, 0.45 + 4 * most) * np.clip((found / most - 0.15) / 0.6, 0, 1)
-        pressure = level * taper(len(t), 0.2, 0.7)[:, None]
+        pressure = level * envelope(len(t), 0.2, 0.7)[:, None]
         for i in np.argsort(u):
             self.add(hairs[:, i], pressure[:, i], colour, width, "brow")
 
@@ -379,7 +380,7 @@ class _Sitter:
             around = dip[i - apart : i + apart + 1]
             if dip[i] == around.max() and dip[i] > 0.012 and light[i] > teeth - 0.2:
                 path = curve(np.stack([upper[i], 0.25 * upper[i] + 0.75 * lower[at[i]]]))
-                pressure = min(0.4, 0.15 + 6 * float(dip[i])) * taper(len(path), 0.1, 0.6)
+                pressure = min(0.4, 0.15 + 6 * float(dip[i])) * envelope(len(path), 0.1, 0.6)
                 self.add(path, pressure, f32([0.6, 0, 0.02]), 0.6 * self.fine, "white")
 
     def contours(self) -> None:
@@ -405,11 +406,11 @@ class _Sitter:
             if len(chain) < 0.5 * self.eye:
                 continue
             path = curve(chain[:: max(1, len(chain) // 16)])
-            pressure = np.clip(4.5 * smooth(sampled(dark, path), 5), 0, 0.9) * taper(
+            pressure = np.clip(4.5 * smooth(sampled(dark, path), 5), 0, 0.9) * envelope(
                 len(path), 0.2, 0.3
             )
             colour = np.median(sampled(self.lab, path), 0) - f32([0.1, 0, 0])
-            tint = np.linalg.norm(colour[1:] - self.skin[1:] * max(0.5, colour[0] / self.skin[0]))
+            tint = norm(colour[1:] - self.skin[1:] * max(0.5, colour[0] / self.skin[0]))
             self.add(path, pressure, colour, self.fine, "frame" if tint > 0.06 else "trace")
 
     def blots(self) -> None:
@@ -419,7 +420,7 @@ class _Sitter:
             top, bottom = (
                 self.face.path(lid[side]) for lid in (subject.UPPER_LID, subject.LOWER_LID)
             )
-            if np.linalg.norm(top[0] - top[-1]) > AWAY * self.eye:
+            if norm(top[0] - top[-1]) > AWAY * self.eye:
                 self.line(0.5 * (top + bottom), "lid", 0.3, 0.9, 2, 1.6, (0.1, 0.1), colour=dark)
         lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
         self.line(lips, "mouth", 0.15, 0.6, 2, 1.4, (0.1, 0.1), colour=dark)

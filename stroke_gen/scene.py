@@ -44,21 +44,20 @@ class Scene:
 def read(
     photo: Floats,
     subject: Subject,
-    width_mm: float,
-    height_mm: float,
+    sheet_mm: tuple[float, float],
     swatches: Swatches,
     style: Style,
     focus: Sequence[Box],
     pool: Executor,
 ) -> Scene:
-    """See a photo in linear light (h, w, 3) for a sheet of the given size, as far as these crayons
-    can draw it.
+    """See a photo in linear light (h, w, 3) for a sheet of this width and height, as far as these
+    crayons can draw it.
 
     focus: boxes (x, y, w, h) in fractions of the picture that deserve care.
     """
-    cell_mm = max(width_mm, height_mm) / analysis.WORK_LONG
+    cell_mm = max(sheet_mm) / analysis.WORK_LONG
     tip = style.tip_mm / cell_mm
-    seen = analysis.unframed(analysis.fit(photo, analysis.work_shape(width_mm, height_mm)))
+    seen = analysis.unframed(analysis.fit(photo, analysis.work_shape(*sheet_mm)))
     lab = analysis.tone_map(oklab(seen), swatches, style, tip)
     target = from_oklab(lab)
     detail = pool.submit(lambda: analysis.detail(lab, tip))
@@ -69,7 +68,8 @@ def read(
     calm = oklab(analysis.calmed(target, max(1, round(CALM * tip))))
     structure = pool.submit(lambda: analysis.structure(calm, tip))
     label = surfaces.part(calm, care, subject.mask + skin, tip, style.merge)
-    family = surfaces.families(label, calm, skin + 2 * hair + 0.5 * subject.mask, style.merge)[label].astype(np.int32)
+    kind = skin + 2 * hair + 0.5 * subject.mask
+    family = surfaces.families(label, calm, kind, style.merge)[label].astype(np.int32)
     field = structure.result()
     tangent = surfaces.directions(field, label, care, tip, style.wrist_deg, style.wrist)
     coherence = np.hypot(field[..., 0], field[..., 1]) / (field[..., 2] + 1e-6)

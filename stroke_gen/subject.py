@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import networks
+from .alike import norm
 from .colour import oklab
 from .jit import lean_kernel
 from .saliency import saliency
@@ -64,14 +65,14 @@ class Face:
     def eye_width(self) -> float:
         """Width in cells of the eye that shows more."""
         return max(
-            float(np.linalg.norm(self.landmarks[lid[0]] - self.landmarks[lid[-1]]))
+            norm(self.landmarks[lid[0]] - self.landmarks[lid[-1]])
             for lid in UPPER_LID
         )
 
     @property
     def height(self) -> float:
         """From the hair to the chin, in cells."""
-        return float(np.linalg.norm(self.landmarks[CROWN] - self.landmarks[CHIN]))
+        return norm(self.landmarks[CROWN] - self.landmarks[CHIN])
 
     @property
     def down(self) -> Floats:
@@ -252,7 +253,7 @@ def hair(subject: Subject, lab: Floats, bare: Floats) -> Floats:
         head = soft(_oval(face, shape, 1.75, 0.25), 0.08 * face.height) * (
             1 - _oval(face, shape, 0.9)
         )
-        forehead = _along(face, shape) < (face.path((33, 263)) @ face.down).mean()
+        forehead = _along(face, shape) < (face.path((33, 263)) * face.down).sum(1).mean()
         sample = lab[(_oval(face, shape, 1.3) - _oval(face, shape)) * free * forehead > 0.5]
         if len(sample) > MANY:
             out = np.maximum(out, head * free * _alike(lab, sample) ** 2)

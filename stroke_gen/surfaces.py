@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.segmentation import felzenszwalb
 
+from .alike import norm
 from .analysis import blur
 from .jit import kernel
 
@@ -261,4 +262,4 @@ def _direction(
     shape = np.array([xx - yy, 2 * xy]) / (xx + yy + 1e-6)
     large = min(1.0, 4 * len(x) / sheet)
     one = FORM * own + SHAPE * shape * (1 - 0.5 * large) + hand
-    return np.asarray(one / (np.linalg.norm(one) + 1e-9), np.float32)
+    return np.asarray(one / (norm(one) + 1e-9), np.float32)

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import eyes, subject
-from .marks import Floats, Mark, curve, f32, spiral, taper, unit
+from .alike import norm
+from .marks import Floats, Mark, curve, envelope, f32, spiral, unit
 from .subject import Face
 
 
@@ -25,7 +26,7 @@ class _Child:
         self.face, self.age, self.rng = face, age, rng
         corners = [face.path(lid).mean(0) for lid in subject.UPPER_LID]
         self.right = unit(corners[1] - corners[0])
-        self.size = max(face.eye_width, 0.35 * float(np.linalg.norm(corners[1] - corners[0])))
+        self.size = max(face.eye_width, 0.35 * norm(corners[1] - corners[0]))
         self.width = max(
             2.0, float(np.interp(age, [3, 5, 8, 10], [0.3, 0.22, 0.16, 0.12])) * self.size
         )
@@ -40,7 +41,7 @@ class _Child:
         line = line + shaky * np.stack(
             [np.interp(at, np.arange(len(knots)), k) for k in knots.T], 1
         )
-        press = np.clip(0.8 + 0.1 * self.rng.standard_normal(), 0.6, 1) * taper(
+        press = np.clip(0.8 + 0.1 * self.rng.standard_normal(), 0.6, 1) * envelope(
             len(line), 0.05, 0.1
         )
         self.made.append(Mark(f32(line), f32(press), f32(colour), width * self.width, "symbol"))
@@ -109,7 +110,7 @@ class _Child:
         red = (0.55, 0.36, 0.18)
         lips = 0.5 * (self.face.path(subject.MOUTH_TOP) + self.face.path(subject.MOUTH_BOTTOM))
         bow = np.sin(np.linspace(0, np.pi, len(lips)))[:, None] * self.face.down
-        mood = float(((lips[5] - lips[[0, -1]].mean(0)) @ self.face.down) / self.face.height)
+        mood = float(((lips[5] - lips[[0, -1]].mean(0)) * self.face.down).sum() / self.face.height)
         sag = (0.05 + np.clip(mood, -0.03, 0.04)) * self.face.height
         wide = lips.mean(0) + f32([1.15 if self.age < 8 else 1.0]) * (lips - lips.mean(0))
         if self.age < 8:

@@ -6,6 +6,7 @@ Importing this module is cheap; what is heavy is loaded by the first call.
 from __future__ import annotations
 
 import functools
+import logging
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -237,11 +238,25 @@ def sketch(
     from .wax.paper import colour_linear
 
     with open_photo(image) as photo:
+        _check_narrow(photo, settings)
         check_size(photo.width, photo.height, settings.size, settings.preview, photo=photo.decoding,
                    filmed=watch is not None)  # fmt: skip
         light = photo.light(PHOTO_SIDE, colour_linear(settings.ground.colour))
+        if photo.warning:
+            logging.getLogger("crayonize").warning("%s: %s", photo.name, photo.warning)
     drawn: tuple[Drawing, Easel] = workshop().sketch(light, settings, progress, watch)
     return drawn
+
+
+def _check_narrow(photo: Photo, settings: Settings) -> None:
+    """ValueError for a photo so long that no stroke has room between the margins of its sheet."""
+    long, short = max(photo.width, photo.height), min(photo.width, photo.height)
+    narrow_mm = settings.sheet_mm * short / long
+    if narrow_mm < 2 * settings.hand.margin_mm + settings.hand.tip_mm / 2:
+        raise ValueError(
+            f"{photo.name}: is {long / short:.0f} times as long as wide, and only {narrow_mm:.1f} "
+            "mm wide on its sheet, too narrow for strokes; cut it, or choose a larger sheet_mm"
+        )
 
 
 def redraw(

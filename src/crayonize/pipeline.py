@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from stroke_gen import generate as generator
 from stroke_gen import subject
+from stroke_gen.alike import plain_opencv
 from stroke_gen.analysis import fit, work_shape
 from stroke_gen.drawing import Drawing, Stroke
 
@@ -86,6 +87,7 @@ class Easel:
         return optics.render_reduced(self.sheet, self.ground, shape, threads=self.threads)
 
 
+@plain_opencv()
 def easel(
     drawing: Drawing,
     size: int,
@@ -113,6 +115,7 @@ def easel(
     )
 
 
+@plain_opencv()
 def draw(
     drawing: Drawing,
     size: int = Settings.size,
@@ -132,6 +135,7 @@ def draw(
     return stand
 
 
+@plain_opencv()
 def sketch(
     photo: NDArray[np.float32],
     settings: Settings,
@@ -173,7 +177,7 @@ def sketch(
         done += 1
 
     strokes = generator.generate(
-        photo, who, width_mm, height_mm, table, style, settings.seed,
+        photo, who, (width_mm, height_mm), table, style, settings.seed,
         draw=draw, look=stand.seen, threads=stand.threads, focus=settings.focus,
     )  # fmt: skip
     drawing = Drawing(

@@ -1,30 +1,32 @@
-"""Is it a drawing? Measures hatching, paper, borders and strokes of real drawings; one JSON row a
-photo.
+"""Is it a drawing? Measures hatching, paper, borders and strokes of real drawings, a JSON row each.
 
-usage: python -m tests.criteria [--style STYLE] [--size PIXELS] PHOTO ...
+usage: python tests/pictures/criteria.py [--style STYLE] [--size PIXELS] PHOTO ...
 
 D is the width of the style's usual tip. In brackets what a good drawing of style artist reaches.
-follow    5  strokes against the field their coat was given: mean cos of twice the angle, by length
-(> 0.9) form      5  the same against the form of the photo, without the angle between coats  (>
-0.75)
-hatch     5  what is seen: direction of the lightness finer than D against the form, by energy  (>=
-0.09) plain     5  the same where the photo itself is plain, so that only hatching can have a
-direction  (>= 0.09) kept      5  plain, over that of all coats but the touches  (>= 0.75)
-covered   7  share of the ground that is not to be paper within reach of a stroke  (>= 0.85)
-wax       7  share of the same ground with wax on it: the paper's valleys stay bare
-reserve   7  share of what is to be bare paper (L* > 93, chroma < 6) without wax  (>= 0.9), null if
-little is frame     7  wax in the outer 2 D of the sheet over wax inside, where paper is not wanted
-(>= 0.9)
-over      8  how far wax, but for touches, lies outside the surfaces made of it, in D: median and 95
-%  (<= 0.2, 0.8) spilt     8  share of their wax that lies outside  (<= 0.04)
-slip      8  how far lines run beyond the ground that wants them, in D: median and 95 % of all
-strokes strokes   9  number, and per megapixel  (<= 15000)
-length    9  of hatching strokes in D: median and 95 %  (6 to 15, <= 40)
-first     9  the same without touches
-travel    9  length of all strokes in D per megapixel  (<= 48000)
-crayons   9  taken from the box
-layers    9  area of all strokes over the area covered
-sharp     9  share of turns within a line of more than 50 degrees on 0.3 D  (0)
+
+follow   strokes against the field their coat was given: mean cos of twice the angle, by length
+         (> 0.9)
+form     the same against the form of the photo, without the angle between coats (> 0.75)
+hatch    what is seen: direction of the lightness finer than D against the form, by energy (>= 0.09)
+plain    the same where the photo itself is plain, so that only hatching can have a direction
+         (>= 0.09)
+kept     plain, over that of all coats but the touches (>= 0.75)
+covered  share of the ground that is not to be paper within reach of a stroke (>= 0.85)
+wax      share of the same ground with wax on it: the paper's valleys stay bare
+reserve  share of what is to be bare paper (L* > 93, chroma < 6), more than D from all else, that
+         looks so (>= 0.99); null if there is little of it
+frame    wax in the outer 2 D of the sheet over wax inside, where paper is not wanted (>= 0.9)
+over     how far wax, but for touches, lies outside the surfaces made of it, in D: median and 95 %
+         (<= 0.2, 0.8)
+spilt    share of their wax that lies outside (<= 0.04)
+slip     how far lines run beyond the ground that wants them, in D: median and 95 % of all strokes
+strokes  number, and per megapixel (<= 15000)
+length   of hatching strokes in D: median and 95 % (6 to 15, <= 40)
+first    the same without touches
+travel   length of all strokes in D per megapixel (<= 48000)
+crayons  taken from the box
+layers   area of all strokes over the area covered
+sharp    share of turns within a line of more than 50 degrees on 0.3 D (0)
 """
 
 import argparse
@@ -189,12 +191,13 @@ def plain_ground(light: Floats, tip: float) -> Mask:
 
 def paper(plan: Plan, drawing: Drawing, easel: Easel, style: Style) -> dict[str, float | None]:
     shape = easel.sheet.rows, easel.sheet.cols
-    lab = lightness(enlarged(plan.scene.target, shape), colours=True)
-    bare = (lab[..., 0] > 93) & (np.hypot(lab[..., 1], lab[..., 2]) < 6)
+    bare = like_paper(enlarged(plan.scene.target, shape))
     wax = easel.sheet.film_um() > WAX_UM
     reached = np.zeros(shape, np.bool_)
     for band in bands(drawing.strokes, shape, easel.sheet.cell_mm):
         reached |= band
+    shows_paper = like_paper(easel.picture(light=False))
+    clear = distance(~bare) > style.tip_mm / easel.sheet.cell_mm
     rim = np.ones(shape, np.bool_)
     edge = max(1, round(2 * style.tip_mm / easel.sheet.cell_mm))
     rim[edge:-edge, edge:-edge] = False
@@ -203,7 +206,7 @@ def paper(plan: Plan, drawing: Drawing, easel: Easel, style: Style) -> dict[str,
     return {
         "covered": share(reached, ~bare),
         "wax": share(wax, ~bare),
-        "reserve": share(~wax, bare) if bare.mean() > 0.002 else None,
+        "reserve": share(shows_paper, clear) if bare.mean() > 0.002 else None,
         "frame": outside / inside if outside is not None and inside else None,
     }
 
@@ -319,6 +322,12 @@ def lightness(linear: Floats, colours: bool = False) -> Floats:
     code = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     lab = rgb2lab(code).astype(np.float32)
     return np.ascontiguousarray(lab if colours else lab[..., 0])
+
+
+def like_paper(linear: Floats) -> Mask:
+    """Where linear light looks like bare white paper."""
+    lab = lightness(linear, colours=True)
+    return np.asarray((lab[..., 0] > 93) & (np.hypot(lab[..., 1], lab[..., 2]) < 6))
 
 
 def share(mask: Mask, where: Mask) -> float | None:

@@ -1,10 +1,9 @@
 """Pictures kept in tests/golden, and how a new one is compared with them.
 
 Another processor or another OpenCV may draw a stroke a little differently, so pictures are compared
-as they look
-from afar, square by square: mean colour, and how strong the grain is. `pytest --store-golden`
-stores them anew; look at them before committing. A failure leaves NAME-actual, NAME-expected and
-NAME-difference in tests/golden/failed.
+as they look from afar, square by square: mean colour, and how strong the grain is. `pytest
+--store-golden` stores them anew; look at them before committing. A failure leaves NAME-actual,
+NAME-expected and NAME-difference in tests/golden/failed.
 """
 
 from pathlib import Path

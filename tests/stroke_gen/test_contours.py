@@ -45,7 +45,7 @@ def strokes_of(photo, style, seed=0, table=None, mask=None):
         (), np.zeros(analysis.work_shape(WIDTH, HEIGHT), np.float32) if mask is None else mask
     )
     return generate(
-        photo, who, WIDTH, HEIGHT, table, style, seed, draw=sheet.draw, look=sheet.look, threads=2
+        photo, who, (WIDTH, HEIGHT), table, style, seed, draw=sheet.draw, look=sheet.look, threads=2
     )
 
 
@@ -189,7 +189,7 @@ def test_a_line_is_darker_than_both_sides_of_it():
     sheet = FlatSheet(WIDTH, HEIGHT, table)
     who = Subject((), np.zeros(analysis.work_shape(WIDTH, HEIGHT), np.float32))
     generate(
-        photo, who, WIDTH, HEIGHT, table, steady(), 0, draw=sheet.draw, look=sheet.look, threads=2
+        photo, who, (WIDTH, HEIGHT), table, steady(), 0, draw=sheet.draw, look=sheet.look, threads=2
     )
     light = oklab(sheet.light)[..., 0]
     y, x = np.mgrid[: light.shape[0], : light.shape[1]] * (WIDTH / light.shape[1])

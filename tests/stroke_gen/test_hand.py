@@ -15,7 +15,7 @@ from stroke_gen.params import Style, load_style
 
 STEADY = Style(force_spread=0, swell=0, wobble=0, overshoot=0)
 TIP = Tip("blunt", 2.0)
-AREA = 0.785 * 2.0**2  # of the tip
+AREA = TIP.area_mm2
 
 
 def lines(number=1, points=101, legs=1, pressure=0.3):
@@ -57,7 +57,7 @@ def test_lines_begin_and_end_lightly():
     (stroke,) = drawn(lines())
     force, along = stroke.force_n, stroke.path_mm[:, 0] - 10
     assert 0.2 < force[0] / force[50] < 0.7 and force[-1] == pytest.approx(force[0], rel=0.01)
-    inner = (along > hand.TAPER * 2.0) & (along < 50 - hand.TAPER * 2.0)
+    inner = (along > hand.HATCH_TAPER * 2.0) & (along < 50 - hand.HATCH_TAPER * 2.0)
     assert np.ptp(force[inner]) < 0.002
     assert (np.diff(force[:3]) >= 0).all() and (np.diff(force[-3:]) <= 0).all()
 
@@ -157,10 +157,10 @@ def replace_points(paths, value):
 
 def test_on_a_thread_of_a_sheet_the_hand_is_held_back():
     strokes = drawn(lines(50), replace(load_style("child"), wobble=1.0), Tip("blunt", 4.0))
-    held = hand.within(strokes, 297.0, 8.0)
+    held = hand.within(strokes, (297.0, 8.0))
     points = np.concatenate([s.path_mm for s in held])
     assert points[:, 1].min() >= -8 and points[:, 1].max() == 16
-    assert hand.within(strokes, 297.0, 210.0) == strokes
+    assert hand.within(strokes, (297.0, 210.0)) == strokes
     for one, two in zip(strokes, held, strict=True):
         assert (one.force_n == two.force_n).all()
 

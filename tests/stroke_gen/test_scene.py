@@ -23,7 +23,7 @@ def seen_of(photo, mask=None, style=None, focus=(), long_mm=72.0):
     mask = np.zeros(analysis.work_shape(width, height), np.float32) if mask is None else mask
     with ThreadPoolExecutor(2) as pool:
         return scene.read(
-            photo, Subject((), mask), width, height, box(), style or Style(), focus, pool
+            photo, Subject((), mask), (width, height), box(), style or Style(), focus, pool
         )
 
 

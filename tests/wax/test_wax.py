@@ -601,17 +601,21 @@ def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
         pytest.skip("Fig. 7 as printed moves wax past the level that it seeks")
     monkeypatch.setattr("crayonize.wax.tip.BUMP_UM", 0.0)
     n = round(14 / cell_mm)
-    sheet = bench.sheet(np.zeros((n, n)), cell_mm)
-    bench.draw(sheet, hatching(bench, um, 14.0, 30))
-    film = sheet.film_um()[n // 4 : -n // 4, n // 4 : -n // 4].astype(float)
-    fine = (
-        film
-        - (np.roll(film, 1, 0) + np.roll(film, -1, 0) + np.roll(film, 1, 1) + np.roll(film, -1, 1))
-        / 4
-    )
-    fine = fine[2:-2, 2:-2]
-    # .092 under heavy force if nothing yields
-    assert fine.std() < (0.075 if um == 10 else 0.065) * film.mean()
+
+    def grain(bench):
+        """What of a film is finer than two cells: how strong, and how like its neighbour's."""
+        sheet = bench.sheet(np.zeros((n, n)), cell_mm)
+        bench.draw(sheet, hatching(bench, um, 14.0, 30))
+        film = sheet.film_um()[n // 4 : -n // 4, n // 4 : -n // 4].astype(float)
+        around = sum(np.roll(film, step, axis) for step in (1, -1) for axis in (0, 1)) / 4
+        fine = (film - around)[2:-2, 2:-2]
+        return fine.std() / film.mean(), (fine[1:] * fine[:-1]).mean() / fine.var()
+
+    strong, alike = grain(bench)
+    loose_strong, loose_alike = grain(bench.changed(yields=0.0))
+    assert strong < (0.075 if um == 10 else 0.065)
+    assert strong < (0.9 if um == 10 else 0.75) * loose_strong
+    assert alike > loose_alike + 0.05, "without yielding every other cell is high"
 
 
 def test_nothing_is_pressed_harder_than_wax_bears(bench):

@@ -1,10 +1,10 @@
-"""The conductor of a batch: plan, lock, draw, account."""
+"""The conductor of a batch: plan, lock, draw, account; and what Ctrl-C does to it."""
 
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import FrameType
 from typing import Any
 
@@ -21,6 +21,7 @@ from .output import OutputFolder
 from .plan import Plan, Planner, check_apart, entries, sources
 from .remote import RemoteFolder, SendError, is_remote
 from .report import Report, ReportError
+from .scan import NO_PHOTO
 from .watch import Watch
 
 
@@ -50,6 +51,10 @@ def run(
     report = Report(options.json, options.quiet)
     make_folder = RemoteFolder if is_remote(output) else OutputFolder
     folder = make_folder(output, options.shard, recipe.digest(options.format))
+    if not options.watch and (reason := _no_photos(plan)):
+        report.others(plan.others)
+        report.end(2, reason)
+        return 2
     if options.dry_run:
         existing = Existing(options.existing, folder.journal(), folder.size)
         return _tell(plan, existing.settle_all(plan), report)
@@ -82,6 +87,17 @@ def _fields(recipe: Recipe) -> dict[str, str]:
     return {
         field: Path(str(settings[field])).stem for field in ("palette", "paper", "style", "seed")
     }
+
+
+def _no_photos(plan: Plan) -> str:
+    """What there is instead, if there is nothing but files of kinds that are not read."""
+    ends = {PurePath(name).suffix.lower() or "none" for name, why in plan.others if why == NO_PHOTO}
+    if plan.jobs or plan.elsewhere or not ends:
+        return ""
+    return (
+        f"there is no photo here that can be read, only files that end in {', '.join(sorted(ends))}"
+        "; JPEG, PNG, WebP, TIFF, AVIF and HEIC are read"
+    )
 
 
 def _tell(plan: Plan, to_do: Sequence[Job], report: Report) -> int:

@@ -3,9 +3,8 @@ accident.
 
 Each worker has one job at a time and pipes of its own, so that its death costs that one job and
 nobody else's. A reader thread a worker turns all that happens into events in one inbox; only the
-foreman acts on
-them. Time limits are kept here, by killing: nothing inside a worker that hangs could keep them. A
-worker asks for memory before it opens a photo and waits until there is enough.
+foreman acts on them. Time limits are kept here, by killing: nothing inside a worker that hangs
+could keep them. A worker asks for memory before it opens a photo and waits until there is enough.
 
 Messages are JSON lines: what a worker that has been taken over by a hostile photo sends is only
 ever data.

@@ -41,7 +41,7 @@ class Outcome:
     """What became of one file."""
 
     status: str  # one of STATUSES
-    error: str = ""  # why, in one line
+    error: str = ""  # why, in one line; of one that is ok, a warning
     seconds: float = 0.0
     bytes: int = 0  # size of the picture
     strokes: int = 0

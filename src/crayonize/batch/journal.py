@@ -1,9 +1,8 @@
 """The journal of an output folder: which picture was made from which photo with which settings.
 
 One JSON line is added after a picture stands whole at its name. A line counts as long as the photo,
-the
-recipe and the size of the picture are still those it tells of, wherever it stands in the file: so
-an interrupted run goes on where it was, and a changed photo is drawn anew. A torn line is passed
+the recipe and the size of the picture are still those it tells of, wherever it stands in the file:
+so an interrupted run goes on where it was, and a changed photo is drawn anew. A torn line is passed
 over.
 """
 

@@ -103,7 +103,9 @@ class Studio:
             if error.errno == errno.ENAMETOOLONG:
                 raise ValueError("the name of its picture is too long for this disk") from error
             raise OutputError(f"{error.filename or job.out}: {error.strerror or error}") from error
-        return Outcome("ok", bytes=target.stat().st_size, strokes=len(drawing.strokes))
+        return Outcome(
+            "ok", photo.warning, bytes=target.stat().st_size, strokes=len(drawing.strokes)
+        )
 
     def _look_at(self, photo: Photo) -> tuple[Settings, int]:
         """Settings for this photo, and bytes of memory it will take, by its header alone.

@@ -18,7 +18,7 @@ from typing import Any
 from .job import Found, Job, Outcome
 from .journal import Journal
 from .output import STATE, OutputFolder
-from .scan import Entry, ignored_name, is_picture
+from .scan import NO_PHOTO, Entry, ignored_name, is_picture
 
 _PREFIX = "crayonize-"  # of temporary folders: crayonize-PID-...
 _STORES = {
@@ -71,7 +71,7 @@ def scan(url: str) -> Iterator[Entry]:
         if any(ignored_name(part) for part in PurePosixPath(name).parts):
             yield name, Outcome("ignored", "hidden or a system file")
         elif not is_picture(name):
-            yield name, Outcome("ignored", "no picture, by the end of its name")
+            yield name, NO_PHOTO
         else:
             yield Found(
                 name, name, system.unstrip_protocol(path), int(info["size"]), _version(info)

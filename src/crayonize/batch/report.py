@@ -81,10 +81,13 @@ class Report:
             if outcome.seconds:
                 line["seconds"] = round(outcome.seconds, 3)
             if outcome.error:
-                line["error"] = printable(outcome.error)
+                key = "warning" if outcome.status == "ok" else "error"
+                line[key] = printable(outcome.error)
             _print(json.dumps(line))
         if outcome.status in _BAD:
             self.say(f"{outcome.status}: {name}: {outcome.error}")
+        elif outcome.status == "ok" and outcome.error:
+            self.say(f"{name}: {outcome.error}", always=False)
 
     @property
     def bad(self) -> int:

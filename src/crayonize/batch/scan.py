@@ -19,6 +19,8 @@ _SYSTEM = frozenset(
     ("thumbs.db", "desktop.ini", "__macosx", "@eadir", "$recycle.bin", "system volume information")
 )
 
+NO_PHOTO = Outcome("ignored", "no picture, by the end of its name")
+
 Entry = Found | tuple[str, Outcome]  # a photo, or the name of something else and why it is none
 
 
@@ -64,7 +66,7 @@ def _look(entry: os.DirEntry[str], name: str) -> Entry:
     if not stat.S_ISREG(status.st_mode):
         return name, Outcome("ignored", "no ordinary file")
     if not is_picture(entry.name):
-        return name, Outcome("ignored", "no picture, by the end of its name")
+        return name, NO_PHOTO
     return found(name, name, entry.path, status)
 
 

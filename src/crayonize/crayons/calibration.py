@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from stroke_gen.alike import times
 from stroke_gen.drawing import Stroke, Tip
 from stroke_gen.swatches import TIP_MM, Swatches
 
@@ -84,7 +85,8 @@ def _hatching(row: int, col: int, crayon: str, pressure: float, turn: int) -> St
     ends = np.array([[-half, half], [half, -half]])[np.arange(lines.size) % 2].ravel()
     zigzag = np.stack([ends, np.repeat(lines, 2)], 1)
     angle = np.deg2rad(-50 + 25 * turn)
-    turned = zigzag @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    c, s = np.cos(angle), np.sin(angle)
+    turned = times(zigzag, np.array([[c, -s], [s, c]]))
     fine = np.concatenate([np.linspace(p, q, 12) for p, q in itertools.pairwise(turned)])
     inside = fine[(np.abs(fine) <= half - 0.6).all(1)]
     path = (inside + (np.array([col, row]) + 0.5) * PATCH_MM).astype(np.float32)

@@ -1,11 +1,11 @@
 """What a crayon's colour means as wax: Kubelka-Munk absorption k and scattering s per micrometre.
 
-A crayon is given by the colour it shows on white paper under a film of reference thickness
-(`film_um`) and
-by its hiding: the share of that colour it still shows on black. Those two colours fix k and s
-(Curtis et al. 1997, "Computer-generated watercolor"). The crayons of the 2003 wax-crayon paper come
-as in its Table 2 instead: a colour, and the transmittance t and reflectance s of a layer that is
-`layer_films` such films thick.
+They decide what colour a crayon has in light and in heavy strokes, alone and over others. A crayon
+is given by the colour it shows on white paper under a film of reference thickness (`film_um`) and
+by its hiding: the share of that colour it still shows on black (data/palettes). Those two colours
+fix k and s (Curtis et al. 1997, "Computer-generated watercolor"). The crayons of the 2003
+wax-crayon paper come as in its Table 2 instead: a colour, and the transmittance t and reflectance s
+of a layer that is `layer_films` such films thick.
 """
 
 import math

@@ -2,10 +2,9 @@
 compressed.
 
 The frames come from the one simulation. Strokes are drawn side by side, but a tile of the sheet
-sees them in
-order: right after the last stroke of a frame that touches a tile, the tile is rendered, reduced to
-the size of the film and put aside for that frame. The drawing is not held up, and stays the same,
-bit for bit.
+sees them in order: right after the last stroke of a frame that touches a tile, the tile is
+rendered, reduced to the size of the film and put aside for that frame. The drawing is not held up,
+and stays the same, bit for bit.
 
 A stroke that has only begun when a frame is due is drawn whole by the simulation; the film shows
 the part that the crayon has passed.

@@ -28,7 +28,8 @@ _BINS = (
 _SRGB_TO_XYZ = np.array([[28576, 25239, 9375], [14581, 46983, 3972], [912, 6361, 46787]]) / 65536
 
 
-def _srgb_curve(encoded: NDArray[Any]) -> NDArray[Any]:
+def srgb_curve(encoded: NDArray[Any]) -> NDArray[Any]:
+    """Stored value to light, both 0..1 (IEC 61966-2-1)."""
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
@@ -36,8 +37,9 @@ def _srgb_curve(encoded: NDArray[Any]) -> NDArray[Any]:
 class Light:
     """How stored numbers become linear sRGB: one curve or one a channel, then primaries."""
 
-    curves: tuple[Curve, ...] = (_srgb_curve,)
+    curves: tuple[Curve, ...] = (srgb_curve,)
     matrix: NDArray[np.float32] | None = None  # (3, 3), None when the primaries are those of sRGB
+    is_grey: bool = False  # of a profile for grey pictures
 
 
 SRGB = Light()
@@ -92,7 +94,7 @@ def _encoding_tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """(the code at the lower end of each bin, the light from which each code gives way to the
     next).
     """
-    edges = np.append(_srgb_curve((np.arange(255) + 0.5) / 255), np.inf).astype(np.float32)
+    edges = np.append(srgb_curve((np.arange(255) + 0.5) / 255), np.inf).astype(np.float32)
     # A hundredth below the bin, as rounding may put a value into the bin above; the edge test mends
     # it.
     low = np.searchsorted(edges, (np.arange(_BINS + 1) - 0.01) / _BINS, side="right")
@@ -146,16 +148,16 @@ def _read_profile(profile: bytes) -> Light | None:
     if profile[36:40] != b"acsp" or connection != b"XYZ " or b"A2B0" in tags:
         return None
     if space == b"GRAY":
-        return _simplified(Light((_curve(tags[b"kTRC"]),)))
+        return Light((_curve(tags[b"kTRC"]),), is_grey=True)
     if space != b"RGB ":
         return None
     primaries = [struct.unpack_from(">3i", tags[name], 8) for name in (b"rXYZ", b"gXYZ", b"bXYZ")]
     to_srgb = np.linalg.solve(_SRGB_TO_XYZ, np.array(primaries).T / 65536)
     curves = tuple(_curve(tags[name]) for name in (b"rTRC", b"gTRC", b"bTRC"))
-    return _simplified(Light(curves, to_srgb.astype(np.float32)))
+    return simplified(Light(curves, to_srgb.astype(np.float32)))
 
 
-def _simplified(light: Light) -> Light:
+def simplified(light: Light) -> Light:
     """The light, or plain SRGB if that is the same to a tenth of an 8-bit step.
 
     Unusable curves raise.
@@ -163,7 +165,7 @@ def _simplified(light: Light) -> Light:
     steps = np.linspace(0, 1, 256)
     ramps = np.stack([curve(steps) for curve in light.curves])
     same_primaries = light.matrix is None or np.abs(light.matrix - np.eye(3)).max() < 4e-4
-    return SRGB if same_primaries and np.abs(ramps - _srgb_curve(steps)).max() < 4e-4 else light
+    return SRGB if same_primaries and np.abs(ramps - srgb_curve(steps)).max() < 4e-4 else light
 
 
 def _curve(tag: bytes) -> Curve:

@@ -61,12 +61,9 @@ def kept(old: Exif | None, which: str) -> Exif | None:
     try:
         inside, place = dict(old.get_ifd(_EXIF_FOLDER)), dict(old.get_ifd(_GPS_FOLDER))
         outside = dict(old)
-        if (
-            _TITLE not in outside
-            and isinstance(title := outside.get(_DESCRIPTION), str)
-            and title.strip()
-        ):
-            outside[_TITLE] = title.strip().encode("utf-16-le") + b"\0\0"
+        title = outside.get(_DESCRIPTION)
+        if _TITLE not in outside and isinstance(title, str) and title.strip():
+            outside[_TITLE] = _text(title).strip().encode("utf-16-le") + b"\0\0"
         wanted, wanted_inside = (None, None) if which == "all" else (_SAFE, _SAFE_INSIDE)
         new.update(_chosen(outside, wanted))
         _add_folder(new, _EXIF_FOLDER, _chosen(inside, wanted_inside))
@@ -100,8 +97,22 @@ def _add_folder(exif: Exif, folder: int, tags: dict[int, Any]) -> None:
 
 
 def _chosen(tags: dict[int, Any], wanted: frozenset[int] | None) -> dict[int, Any]:
+    """The tags that go along, text as UTF-8: the standard says ASCII, and nobody keeps to it."""
     return {
-        tag: value
+        tag: value if not isinstance(value, str) or value.isascii() else _text(value).encode()
         for tag, value in tags.items()
         if tag not in _LAYOUT and (wanted is None or tag in wanted)
     }
+
+
+def _text(value: str) -> str:
+    """Text as it was meant, of the single bytes that Pillow gives: UTF-8, or else Windows' Latin-1.
+    """
+    try:
+        raw = value.encode("latin-1")
+    except UnicodeEncodeError:  # has been read already
+        return value
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", "replace")

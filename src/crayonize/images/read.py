@@ -6,25 +6,22 @@ from __future__ import annotations
 
 import os
 import stat
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from importlib import import_module
+from contextlib import contextmanager
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
+
+from stroke_gen.alike import plain_opencv
 
 from ..light import area
-from ..machine import memory
+from .files import Decoded, Stored, identified, of_picture, stored
 from .icc import lineariser
-from .scan import Scan, check_size, damage_named, scan_array, scan_picture
+from .scan import Scan, check_size, scan_array
 
 Source = str | os.PathLike[str] | Image.Image | NDArray[Any]
-
-FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "AVIF")
 
 # pixels turned into light at a time: 1.5 MB of float32, which the cache holds
 _STRIP_PIXELS = 1 << 17
@@ -39,8 +36,6 @@ _TURNS: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
     7: lambda a: a[::-1, ::-1].swapaxes(0, 1),
     8: lambda a: a.swapaxes(0, 1)[::-1],
 }
-
-_pillow_limit = threading.Lock()
 
 
 def read_linear(
@@ -65,36 +60,32 @@ def read_linear(
         return photo.light(max_side, ground)
 
 
-@dataclass
 class Photo:
     """A photo whose header has been read, and whose light can be taken once.
 
-    width, height: pixels as stored.   decoding: bytes that taking the light needs beside the light.
-    exif: what it tells of itself, once its light has been taken; None for an array, or if broken.
+    name: as in messages.   width, height: pixels as stored.   decoding: bytes that taking the light
+    needs beside the light.   exif: what it tells of itself, warning: what is wrong with it ("" if
+    nothing); both once its light has been taken.
     """
 
-    source: Source
-    width: int
-    height: int
-    decoding: int
-    _name: str
-    _picture: Image.Image | None
-    _scan: Callable[[], Scan]
-    exif: Image.Exif | None = None
+    def __init__(self, source: Source, name: str, picture: Stored) -> None:
+        self.source = source
+        self.width, self.height, self.decoding = picture.width, picture.height, picture.decoding
+        self.exif: Image.Exif | None = None
+        self.warning = ""
+        self.name = name
+        self._decode: Callable[[], Decoded] | None = picture.decode
 
+    @plain_opencv()
     def light(
         self, max_side: int | None = None, ground: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ) -> NDArray[np.float32]:
         """Decode it, as `read_linear` says; the decoded pixels are given back at the end."""
-        with _named(self._name):
-            light = _light(self._scan(), max_side, ground)
-        if self._picture is not None:
-            # Not before it is decoded: Pillow decodes a PNG for them, and an error would be lost.
-            with suppress(Exception):  # broken EXIF raises nearly anything
-                self.exif = self._picture.getexif()
-            if not isinstance(self.source, Image.Image):
-                self._picture.close()
-        return light
+        assert self._decode is not None, "the light of a photo is taken once"
+        with _named(self.name):
+            scan, self.exif, self.warning = self._decode()
+            self._decode = None
+            return _light(scan, max_side, ground)
 
 
 @contextmanager
@@ -108,27 +99,19 @@ def open_photo(source: Source | Photo) -> Iterator[Photo]:
     elif isinstance(source, np.ndarray):
         with _named("array"):
             scan = scan_array(source)
-        yield Photo(source, scan.width, scan.height, 0, "array", None, lambda: scan)
+        found = Decoded(scan, None, "")
+        yield Photo(source, "array", Stored(scan.width, scan.height, 0, lambda: found))
     elif isinstance(source, Image.Image):
         with _named("picture"):
-            check_size(source.width, source.height)
-        yield _photo(source, source, "picture", None)
+            picture = of_picture(source, None)
+        yield Photo(source, "picture", picture)
     else:
         with _named(shown(source)):
             file = _opened(source)
         with file:
             with _named(shown(source)):
-                picture = _identify(file)
-                check_size(picture.width, picture.height)
-            yield _photo(source, picture, shown(source), file)
-
-
-def _photo(source: Source, picture: Image.Image, name: str, file: IO[bytes] | None) -> Photo:
-    deep = ";16" in repr(getattr(picture, "tile", ""))
-    decoding = memory.decoding(picture.format, picture.width * picture.height, deep)
-    return Photo(
-        source, *picture.size, decoding, name, picture, lambda: scan_picture(picture, file)
-    )
+                picture = stored(file)
+            yield Photo(source, shown(source), picture)
 
 
 def _light(
@@ -151,7 +134,7 @@ def open_picture(path: str | os.PathLike[str]) -> Iterator[tuple[Image.Image, IO
     Names itself in ValueErrors.
     """
     with _named(shown(path)), _opened(path) as file:
-        picture = _identify(file)
+        picture = identified(file)
         check_size(picture.width, picture.height)
         yield picture, file
 
@@ -184,50 +167,6 @@ def _opened(path: str | os.PathLike[str]) -> IO[bytes]:
     raise ValueError("is no ordinary file; give the path of one picture")
 
 
-def _identify(file: IO[bytes]) -> Image.Image:
-    """Let Pillow read the header, by content and among our formats only."""
-    start = file.read(16)
-    if not start:
-        raise ValueError("is an empty file; give a picture")
-    try:
-        return _open_unlimited(file, FORMATS)
-    except UnidentifiedImageError as error:
-        if start[4:8] == b"ftyp":  # the family of HEIC and AVIF
-            return _open_heic(file)
-        kinds = "JPEG, PNG, WebP, TIFF or AVIF"
-        raise ValueError(
-            f"is no {kinds} picture, or its header is damaged; convert it to one of these"
-        ) from error
-
-
-def _open_heic(file: IO[bytes]) -> Image.Image:
-    try:
-        import_module("pi_heif").register_heif_opener()
-    except ImportError as error:
-        raise ValueError(
-            'seems to be a HEIC picture; to read it: pip install "crayonize[heic]"'
-        ) from error
-    try:
-        return _open_unlimited(file, ("HEIF",))
-    except UnidentifiedImageError as error:
-        raise ValueError(
-            "is no HEIC or AVIF picture, or its header is damaged; convert it to JPEG"
-        ) from error
-
-
-def _open_unlimited(file: IO[bytes], formats: tuple[str, ...]) -> Image.Image:
-    """Image.open without Pillow's global limit (warning at 89, end at 179 million); ours is
-    check_size.
-    """
-    file.seek(0)
-    with _pillow_limit, damage_named():
-        before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-        try:
-            return Image.open(file, formats=formats)
-        finally:
-            Image.MAX_IMAGE_PIXELS = before
-
-
 def _develop(scan: Scan, max_side: int | None, ground: NDArray[np.float32]) -> NDArray[np.float32]:
     """Turn strips into light, lay them on the ground, reduce them, and set the picture upright."""
     height, width = scan.height, scan.width
@@ -255,14 +194,23 @@ def _strip_reader(
     to_light = lineariser(scan.light, channels, first.dtype, scan.full)
 
     def strip(top: int, bottom: int) -> NDArray[np.float32]:
-        stored = scan.rows(top, bottom)
-        light = np.empty((*stored.shape[:2], 3), np.float32)
-        light[...] = to_light(stored[..., :channels])
-        if stored.shape[2] > channels:
-            alpha = np.clip(stored[..., channels:].astype(np.float32) / np.float32(scan.full), 0, 1)
-            light = light * alpha + ground * (1 - alpha)
+        values = scan.rows(top, bottom)
+        colours, alpha = values[..., :channels], values[..., channels:]
+        if alpha.size and scan.premultiplied:
+            colours = _divided(colours, alpha, scan.full)
+        light = np.empty((*values.shape[:2], 3), np.float32)
+        light[...] = to_light(colours)
+        if alpha.size:
+            share = np.clip(alpha.astype(np.float32) / np.float32(scan.full), 0, 1)
+            light = light * share + ground * (1 - share)
         if scan.key is not None:
-            light[(stored[..., :channels] == scan.key).all(axis=-1)] = ground
+            light[(colours == scan.key).all(axis=-1)] = ground
         return light
 
     return strip
+
+
+def _divided(colours: NDArray[Any], alpha: NDArray[Any], full: float) -> NDArray[Any]:
+    """Stored colours as they were before they were multiplied by alpha."""
+    whole = np.minimum(colours * (full / np.maximum(alpha, 1e-9)), full)
+    return (np.rint(whole) if colours.dtype.kind == "u" else whole).astype(colours.dtype)

@@ -18,7 +18,7 @@ from stroke_gen.files import check_target, whole_file
 
 from .metadata import flat
 from .read import open_picture, shown
-from .scan import exif_tag
+from .told import exif_tag
 
 SOFTWARE = "crayonize"  # the name under which settings are found again
 Settings = dict[str, str | int | float]

@@ -1,10 +1,9 @@
 """The user's cache folder: compiled kernels and measured tables.
 
 Entries are written whole under their final name and begin with a checksum, so that a damaged one
-counts as
-missing, and any number of processes may write at once. Compiled kernels are code: a folder that
-somebody else could write to is left alone. Nothing here raises; without a usable folder nothing is
-kept.
+counts as missing, and any number of processes may write at once. Compiled kernels are code: a
+folder that somebody else could write to is left alone. Nothing here raises; without a usable folder
+nothing is kept.
 
 CRAYONIZE_CACHE names the folder, CRAYONIZE_NO_CACHE=1 goes without.
 """

@@ -17,7 +17,7 @@ OVERHEAD = 320_000_000  # the libraries, the reduced photo, the planner's work, 
 
 # Bytes a pixel while a photo is decoded and reduced, measured on 50 million pixels. Colour of 16
 # bits is decoded twice.
-_DECODING = {"JPEG": 7, "PNG": 7, "TIFF": 7, "WEBP": 16, "AVIF": 10, "HEIF": 10}
+_DECODING = {"JPEG": 7, "MPO": 7, "PNG": 7, "TIFF": 7, "WEBP": 16, "AVIF": 10, "HEIF": 10}
 _DEEP = 18
 
 _M_ARENA_MAX = -8  # of glibc's malloc.h

@@ -4,8 +4,8 @@ gave.
 Wear carries on within a stroke cell by cell. From stroke to stroke it carries on as a plan: the
 volume that a stroke rubs off follows from its force and length (rate * force / lambda), so each
 stroke's tip is known before any is drawn, and strokes on different tiles can be drawn side by side.
-A drawing says how wide its tips are,
-so one worn flat to its full width is turned or sharpened: the next stroke gets a fresh face.
+A drawing says how wide its tips are, so one worn flat to its full width is turned or sharpened: the
+next stroke gets a fresh face.
 """
 
 from collections import Counter

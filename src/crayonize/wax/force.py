@@ -22,9 +22,8 @@ def balance(gap, wanted, start, epsilon):  # type: ignore[no-untyped-def]
     """Height of the tip at which the overlaps sum to `wanted` (Fig. 4). `start`: the last height.
 
     F(h) = sum max(0, gap - h) is convex and falls with h, so a step of Newton's method lands left
-    of the
-    solution and the next ones rise to it without passing: exact after few steps, where Fig. 4
-        bisects.
+    of the solution and the next ones rise to it without passing: exact after few steps, where Fig.
+    4 bisects.
     """
     h = start
     force, touching = _force(gap, h)

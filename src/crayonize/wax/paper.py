@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stroke_gen.alike import be_plain
 from stroke_gen.checks import did_you_mean
 
 from ..images.srgb import light_of
@@ -202,7 +203,8 @@ def _felt(shape: tuple[int, int], wavelength: float, rng: np.random.Generator) -
         smooth *= np.float32(share) / smooth.std()
         return smooth
 
-    with ThreadPoolExecutor() as pool:  # smooths one band while the next is filled with noise
+    # smooths one band while the next is filled with noise
+    with ThreadPoolExecutor(initializer=be_plain) as pool:
         bands = [
             pool.submit(band, rng.standard_normal(shape, np.float32), scale, share)
             for scale, share in ((0.26, 0.8), (0.7, 0.45), (1.9, 0.25))

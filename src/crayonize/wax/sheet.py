@@ -1,8 +1,8 @@
 """A sheet of paper and the wax on it (section 3.1 of the paper).
 
 A sheet is a height field (the paper's tooth) with a column of wax on each cell, see `columns`.
-Heights are
-in um. Per cell: paper 4, total 4, used 1, crayons 4, layer heights 16, blend 28 = 57 bytes.
+Heights are in um. Per cell: paper 4, total 4, used 1, crayons 4, layer heights 16, blend 28 = 57
+bytes.
 """
 
 import numpy as np
