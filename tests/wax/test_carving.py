@@ -1,4 +1,4 @@
-"""Carving: what sticks to a tip is carried, comes back and saturates the film; grains; local wear."""
+"""Carving: what sticks to a tip is carried along and saturates the film; grains; local wear."""
 
 import numpy as np
 import pytest
@@ -58,7 +58,7 @@ def test_what_is_dragged_along_is_alike_at_any_resolution(metric):
 
 
 def test_a_tip_starts_each_stroke_clean(metric):
-    """A stroke away from the black is the same whether or not its crayon was drawn over it before."""
+    """A stroke is the same whether or not its crayon was drawn over black before."""
     lines = [metric.stroke([[1, y], [13, y]], 10.0) for y in (1.5, 4.5)]
     sheets = [metric.felt(60, 140), metric.felt(60, 140)]
     metric.draw(sheets[0], [metric.stroke([[1, 1.5], [13, 1.5]], 10.0, "black")])
