@@ -314,7 +314,8 @@ def contacts(points, stride):
 def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, number, reach=1):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit.
 
-    It knows neither clumps nor grains. number: the stroke's own. Returns the wax given, and what left with the tip by crayon.
+    It knows neither clumps nor grains. number: the stroke's own. Returns the wax given, and what
+    left with the tip by crayon.
     """
     c = constants
     points, mask = points.astype(float), mask.astype(float)
