@@ -26,7 +26,8 @@ SAMPLES = 24  # colours by which a surface is judged
 GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
-HUE_PRICE = 0.2  # for another hue than the surface's, times how far (see `chord`)
+# for another hue than the surface's, times how far (see `chord`); bodies have their own prices
+HUE_PRICE = 0.2
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
 # for a crayon darker than the surface's darkest, times the difference of lightness
@@ -194,6 +195,8 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     skin, hair = (np.bincount(seen.family.ravel(), m.ravel()) / np.bincount(seen.family.ravel())
                   for m in (seen.skin, seen.hair))  # fmt: skip
     extra = prices(sample, swatches) + np.float32(LAYER_PRICE)
+    off = chord(swatches.masstone()[None, :, 1:], sample.mean(2)[:, None, 1:])
+    extra += np.float32(HUE_PRICE) * off * (1 - np.maximum(skin, hair)).astype(np.float32)[:, None]
     body = skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD)
     dark = np.clip((DARK_BODY - sample[:, 0].mean(1)) / 0.08, 0, 1)
     extra += BODY_PRICE * body * (1 - np.outer(dark, blackness(swatches)))
@@ -263,7 +266,6 @@ def prices(sample: Floats, swatches: Swatches) -> Floats:
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
-    price += HUE_PRICE * chord(hue[None], mean[:, None, 1:])
     price += GREY_PRICE * np.outer(np.maximum(chroma - 0.025, 0), greyness(heavy))
     loud = np.linalg.norm(hue, axis=1)
     price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
