@@ -173,7 +173,9 @@ def tone_map(lab: Floats, swatches: Swatches, style: Style, tip: float) -> Float
     darkest, lightest = float(given.min()), float(given.max())
     out, light = lab.copy(), lab[..., 0]
     low, high = np.percentile(light, (0.5, 98)).tolist()
-    base = cv2.ximgproc.guidedFilter(light, light, max(2, round(LOCAL * tip)), 4e-3)
+    base = np.asarray(
+        cv2.ximgproc.guidedFilter(light, light, max(2, round(LOCAL * tip)), 4e-3), np.float32
+    )
     spread = min(low + FLATTEST * (lightest - darkest), lightest)  # what is light stays light
     dark, bright = min(low, darkest), max(high, spread)
     straight = darkest + (base - dark) * (lightest - darkest) / (bright - dark)

@@ -108,7 +108,7 @@ def _stages(
             )
             continue
         for turn in range(LAYERS) if coat.kind == "fill" else (None,):
-            some = inside * (1 - SPARED * white)
+            some = inside * (1 - np.float32(SPARED) * white)
             yield partial(_fill, plan, inside=some, coat=coat, turn=turn, style=style, rng=rng)
     yield faces
     yield lines

@@ -136,7 +136,8 @@ def prices_of(scene, table, seed=0):
     hair.
     """
     sample = mixing._samples(scene.guide.lab, scene.family, np.random.default_rng(seed))
-    return sample, mixing.prices(sample, table) + mixing.LAYER_PRICE
+    dear = mixing.prices(sample, table) + mixing.turning(sample, table)
+    return sample, dear + mixing.LAYER_PRICE
 
 
 @pytest.mark.parametrize("names, pressures", [(("yellow", "blue"), (4, 2)),
@@ -272,13 +273,24 @@ def test_another_hue_has_its_price_where_the_box_has_a_crayon_of_the_hue(monkeyp
     monkeypatch.setattr(mixing, "OPPOSED_PRICE", 0.0)
     monkeypatch.setattr(mixing, "LOUD_PRICE", 0.0)
     fresh = {**with_greys(), "sky": (0.02, 0.6, 0.5), "green": (0.3, 0.7, 0.05)}
-    few, more = (
-        table_of("yellow", "sky", *green, colours=fresh) for green in ([], ["green"])
-    )
+    few, more = (table_of("yellow", "sky", *green, colours=fresh) for green in ([], ["green"]))
     mixed = swatch("sky", 3, few, swatch("yellow", 4, few))
     assert taken(monkeypatch, "HUE_PRICE", 0.0, mixed, more) >= {"yellow", "sky"}
     assert taken(monkeypatch, "HUE_PRICE", 5.0, mixed, more) == {"green"}
     assert taken(monkeypatch, "HUE_PRICE", 5.0, mixed, few) == {"yellow", "sky"}
+
+
+def test_bodies_have_their_own_prices_of_hue(monkeypatch):
+    """As far as hue goes, skin and hair may be turned; what is foreign to them is priced apart."""
+    monkeypatch.setattr(mixing, "BODY_PRICE", np.float32(0))
+    monkeypatch.setattr(mixing, "OPPOSED_PRICE", 0.0)
+    monkeypatch.setattr(mixing, "LOUD_PRICE", 0.0)
+    table = table_of("yellow", "pink", "tan")
+    mixed = swatch("pink", 3, table, swatch("yellow", 4, table))
+    monkeypatch.setattr(mixing, "HUE_PRICE", 5.0)
+    assert found(mixed, table=table) == [["tan"]]
+    for body in ("skin", "hair"):
+        assert set(found(mixed, table=table, **{body: [0]})[0]) >= {"yellow", "pink"}
 
 
 def test_a_hue_of_some_of_the_surface_is_its_own(monkeypatch):
@@ -289,7 +301,7 @@ def test_a_hue_of_some_of_the_surface_is_its_own(monkeypatch):
         prices = []
         for price in (0.0, 1.0):
             monkeypatch.setattr(mixing, "HUE_PRICE", price)
-            prices.append(mixing.prices(sample, table)[0])
+            prices.append(mixing.turning(sample, table)[0])
         yellow, blue, black = prices[1] - prices[0]
         assert (blue > 0.1) == dear and max(yellow, black) < 0.05
 
