@@ -174,14 +174,14 @@ def tone_map(lab: Floats, swatches: Swatches, style: Style, tip: float) -> Float
     out, light = lab.copy(), lab[..., 0]
     low, high = np.percentile(light, (0.5, 98)).tolist()
     base = cv2.ximgproc.guidedFilter(light, light, max(2, round(LOCAL * tip)), 4e-3)
-    dark, bright = min(low, darkest), max(high, low + FLATTEST * (lightest - darkest))
+    spread = min(low + FLATTEST * (lightest - darkest), lightest)  # what is light stays light
+    dark, bright = min(low, darkest), max(high, spread)
     straight = darkest + (base - dark) * (lightest - darkest) / (bright - dark)
     tone = style.lift * straight + (1 - style.lift) * _toe(base, low, darkest)
     out[..., 0] = np.clip(tone + light - base, darkest, lightest)
     chroma = np.hypot(lab[..., 1], lab[..., 2])
-    white = np.clip((out[..., 0] - WHITE) / (lightest - WHITE - 0.03), 0, 1) * np.clip(
-        2 - chroma / 0.03, 0, 1
-    )
+    paling = max(lightest - WHITE - 0.03, 0.01)  # no crayon may be that light on dark paper
+    white = np.clip((out[..., 0] - WHITE) / paling, 0, 1) * np.clip(2 - chroma / 0.03, 0, 1)
     out[..., 0] += white * white * (3 - 2 * white) * (lightest - out[..., 0])
     warm = np.clip(
         (lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1

@@ -284,7 +284,7 @@ def _crayons(
     ground = _means(_sample(now, lines.points), lines.first)
     aim = darker.copy()
     aim[:, 0] = np.minimum(darker[:, 0], oklab(ground)[:, 0]) - DARKER
-    hardest = box.pressures >= LEAST_PRESSURE
+    hardest = box.pressures >= min(LEAST_PRESSURE, box.pressures[-1])  # a light hand's firmest
     colours = oklab(box.over(ground))[:, :, hardest]
     off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 1.2, 1.2]), axis=3)
     off += 0.3 * np.maximum(colours[..., 0] - aim[:, None, None, 0] - 0.03, 0)

@@ -110,9 +110,8 @@ def _stages(
             )
             continue
         for turn in range(LAYERS) if coat.kind == "fill" else (None,):
-            yield partial(
-                _fill, plan, inside=inside * (1 - SPARED * white), coat=coat, turn=turn, style=style, rng=rng
-            )
+            some = inside * (1 - SPARED * white)
+            yield partial(_fill, plan, inside=some, coat=coat, turn=turn, style=style, rng=rng)
     yield faces
     yield lines
 
@@ -147,7 +146,7 @@ def _fill(
     gaps = (1 + style.open * (1 - seen.care)).astype(np.float32)
     careful = seen.care > SUBJECT
     extent_mm = seen.cell_mm * float(np.sqrt(np.count_nonzero(careful)))
-    fine = max(FINEST, min(coat.fine, extent_mm / (ACROSS * style.tip_mm)))
+    fine = min(coat.fine, max(FINEST, extent_mm / (ACROSS * style.tip_mm)))
     parts = []
     for k in sorted(wants, key=lambda k: -plan.swatches.lightness()[k]):
         for factor, where in ((coat.tip, ~careful), (fine, careful)):

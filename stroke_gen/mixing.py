@@ -26,8 +26,9 @@ SAMPLES = 24  # colours by which a surface is judged
 GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
-# for another hue than the surface's, times how far (see `chord`); bodies have their own prices
+# for another hue than the surface's, where the box has one of it, times how far (see `chord`)
 HUE_PRICE = 0.2
+OF_IT = 25  # per cent of a surface that are enough for a hue to be one of its own
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
 # for a crayon darker than the surface's darkest, times the difference of lightness
@@ -194,9 +195,7 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     order = np.argsort(-swatches.lightness(), kind="stable")
     skin, hair = (np.bincount(seen.family.ravel(), m.ravel()) / np.bincount(seen.family.ravel())
                   for m in (seen.skin, seen.hair))  # fmt: skip
-    extra = prices(sample, swatches) + np.float32(LAYER_PRICE)
-    off = chord(swatches.masstone()[None, :, 1:], sample.mean(2)[:, None, 1:])
-    extra += np.float32(HUE_PRICE) * off * (1 - np.maximum(skin, hair)).astype(np.float32)[:, None]
+    extra = prices(sample, swatches, np.maximum(skin, hair)) + np.float32(LAYER_PRICE)
     body = skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD)
     dark = np.clip((DARK_BODY - sample[:, 0].mean(1)) / 0.08, 0, 1)
     extra += BODY_PRICE * body * (1 - np.outer(dark, blackness(swatches)))
@@ -246,9 +245,7 @@ def few(number: int) -> Ints:
     return np.unique(np.linspace(0, number, 5).round()).astype(np.int64)
 
 
-def _samples(
-    lab: Floats, label: NDArray[np.int32], rng: np.random.Generator
-) -> Floats:
+def _samples(lab: Floats, label: NDArray[np.int32], rng: np.random.Generator) -> Floats:
     """Colours (surfaces, 3, SAMPLES) of each surface."""
     flat, colours = label.ravel(), lab.reshape(-1, 3)
     where = np.argsort(flat, kind="stable")
@@ -259,13 +256,19 @@ def _samples(
     return np.ascontiguousarray(colours[chosen].swapaxes(1, 2))
 
 
-def prices(sample: Floats, swatches: Swatches) -> Floats:
-    """What a crayon costs in a surface (surfaces, crayons), beside the distance it leaves."""
+def prices(sample: Floats, swatches: Swatches, body: Floats | float = 0.0) -> Floats:
+    """What a crayon costs in a surface (surfaces, crayons), beside the distance it leaves.
+
+    body: how far each surface is skin or hair, 0..1, whose hues have a price of their own.
+    """
     colours = oklab(swatches.over(swatches.paper))
     hue, heavy = swatches.masstone()[:, 1:], colours[:, -1]
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
+    off = chord(hue[None, :, None], sample.swapaxes(1, 2)[:, None, :, 1:])
+    turned = HUE_PRICE * held(hue, mean[:, 1:]) * (1 - np.asarray(body))
+    price += turned[:, None] * np.percentile(off, OF_IT, axis=2)
     price += GREY_PRICE * np.outer(np.maximum(chroma - 0.025, 0), greyness(heavy))
     loud = np.linalg.norm(hue, axis=1)
     price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
@@ -310,6 +313,14 @@ def chord(one: Floats, other: Floats) -> Floats:
     dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
     both = np.sqrt((one**2).sum(-1) * (other**2).sum(-1))
     return np.asarray(np.sqrt(np.maximum(2 * (both - dot), 0)))
+
+
+def held(hues: Floats, wanted: Floats) -> Floats:
+    """Whether a box of some hues (k, 2) in a and b holds those that are wanted (n, 2): 1 within 20
+    degrees or so, 0 from 45 degrees.
+    """
+    one, other = (h / (np.linalg.norm(h, axis=1, keepdims=True) + 0.01) for h in (hues, wanted))
+    return np.asarray(np.clip(((other @ one.T).max(1) - 0.7) / 0.2, 0, 1), np.float32)
 
 
 def greyness(colours: Floats) -> Floats:

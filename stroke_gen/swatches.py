@@ -16,6 +16,7 @@ from .colour import oklab
 Floats = NDArray[np.float32]
 TIP_MM = 2.4  # width of the blunt tip that hatched the swatches
 COVERED = 0.3  # linear light by which a ground covered with wax differs from the paper at least
+FIRM = 0.38  # N/mm^2: laid well, but not burnished
 # a tip n times finer needs n**FINER times the pressure for the same colour: it passes sooner
 FINER = 0.75
 
@@ -43,7 +44,7 @@ class Swatches:
         return oklab(self.over(self.paper))[:, -1, 0]
 
     def upto(self, hardest: float) -> "Swatches":
-        """The table of a hand that presses no harder than so many N/mm^2."""
+        """The table of a hand that presses no harder than so many N/mm^2; two pressures at least."""
         n = max(2, int((self.pressures <= hardest + 1e-6).sum()))
         return Swatches(
             self.names,
@@ -56,7 +57,7 @@ class Swatches:
 
     def masstone(self) -> Floats:
         """OKLab (k, 3) of each crayon laid well, but not burnished, on the bare paper."""
-        p = min(int(np.searchsorted(self.pressures, 0.38)), len(self.pressures) - 1)
+        p = min(int(np.searchsorted(self.pressures, FIRM - 1e-6)), len(self.pressures) - 1)
         return oklab(self.over(self.paper))[:, p]
 
     def only(self, chosen: list[int]) -> "Swatches":

@@ -230,7 +230,11 @@ def test_plates_are_the_same_with_any_number_of_threads(turn):
         np.random.default_rng(2).random((129, 81, 3)).astype(np.float32), (0, 0), 3
     )
     family = np.random.default_rng(3).integers(0, 5, (43, 27)).repeat(3, 0).repeat(3, 1)
-    first, *others = (wanted(plan_for(photo, family, threads=n), turn=turn) for n in POOLS)
+    layers = [["yellow", "blue"], ["pink", "green"], ["sky", "brown"], ["white", "red", "black"],
+              ["yellow", "sky", "green", "black"]]  # fmt: skip
+    first, *others = (
+        wanted(plan_for(photo, family, threads=n, layers=layers), turn=turn) for n in POOLS
+    )
     for other in others:
         assert (
             first
