@@ -63,9 +63,9 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
     with ThreadPoolExecutor(threads, initializer=be_plain) as pool:
-        swatches = swatches.upto(style.hardest)
-        seen = scene.read(photo, subject, sheet_mm, swatches, style, focus, pool)
-        plan = _plan(seen, swatches, style, rng, pool)
+        filled = swatches.upto(style.hardest)
+        seen = scene.read(photo, subject, sheet_mm, filled, style, focus, pool)
+        plan = _plan(seen, filled, style, rng, pool)
         tip = style.tip_mm / seen.cell_mm
         inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, tip, rng)
         inside *= margin.faded(seen.care, style.fade, tip, style.wrist_deg, rng)
@@ -95,6 +95,8 @@ def _stages(
     def lines(now: Floats) -> list[Stroke]:
         return contours.outlines(plan, now, inside * (1 - ovals), style, rng)
 
+    firm = replace(plan, swatches=box.only(plan.crayons))  # features are pressed as they ask
+
     def faces(now: Floats) -> list[Stroke]:
         return portrait.draw(seen.subject, seen.natural, inside, box, seen.cell_mm, style, rng)
 
@@ -104,7 +106,7 @@ def _stages(
     for coat in style.passes:
         if coat.kind == "touch":
             yield partial(
-                _touch, plan, inside=inside * (1 - features), coat=coat, style=style, rng=rng
+                _touch, firm, inside=inside * (1 - features), coat=coat, style=style, rng=rng
             )
             continue
         for turn in range(LAYERS) if coat.kind == "fill" else (None,):
@@ -119,7 +121,8 @@ def _plan(
 ) -> Plan:
     """Take crayons out of the box."""
     mixtures = mixing.find(seen, swatches, style.crayons, rng)
-    return Plan(seen, swatches.only(mixtures.crayons()), mixtures.alone(), pool)
+    chosen = mixtures.crayons()
+    return Plan(seen, chosen, swatches.only(chosen), mixtures.alone(), pool)
 
 
 def _fill(

@@ -26,8 +26,7 @@ SAMPLES = 24  # colours by which a surface is judged
 GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
-# for another hue than the surface's, where the box has one of it, times how far (see `chord`);
-# bodies have their own prices
+# for another hue than the surface's, where the box has one of it, times how far (see `chord`)
 HUE_PRICE = 0.2
 OF_IT = 25  # per cent of a surface that are enough for a hue to be one of its own
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
@@ -196,8 +195,7 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     order = np.argsort(-swatches.lightness(), kind="stable")
     skin, hair = (np.bincount(seen.family.ravel(), m.ravel()) / np.bincount(seen.family.ravel())
                   for m in (seen.skin, seen.hair))  # fmt: skip
-    extra = prices(sample, swatches) + np.float32(LAYER_PRICE)
-    extra += turning(sample, swatches) * (1 - np.maximum(skin, hair)).astype(np.float32)[:, None]
+    extra = prices(sample, swatches, np.maximum(skin, hair)) + np.float32(LAYER_PRICE)
     body = skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD)
     dark = np.clip((DARK_BODY - sample[:, 0].mean(1)) / 0.08, 0, 1)
     extra += BODY_PRICE * body * (1 - np.outer(dark, blackness(swatches)))
@@ -258,29 +256,25 @@ def _samples(lab: Floats, label: NDArray[np.int32], rng: np.random.Generator) ->
     return np.ascontiguousarray(colours[chosen].swapaxes(1, 2))
 
 
-def prices(sample: Floats, swatches: Swatches) -> Floats:
-    """What a crayon costs in a surface (surfaces, crayons), beside the distance it leaves."""
+def prices(sample: Floats, swatches: Swatches, body: Floats | float = 0.0) -> Floats:
+    """What a crayon costs in a surface (surfaces, crayons), beside the distance it leaves.
+
+    body: how far each surface is skin or hair, 0..1, whose hues have a price of their own.
+    """
     colours = oklab(swatches.over(swatches.paper))
     hue, heavy = swatches.masstone()[:, 1:], colours[:, -1]
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
+    off = chord(hue[None, :, None], sample.swapaxes(1, 2)[:, None, :, 1:])
+    turned = HUE_PRICE * held(hue, mean[:, 1:]) * (1 - np.asarray(body))
+    price += turned[:, None] * np.percentile(off, OF_IT, axis=2)
     price += GREY_PRICE * np.outer(np.maximum(chroma - 0.025, 0), greyness(heavy))
     loud = np.linalg.norm(hue, axis=1)
     price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
     darkest = np.percentile(sample[:, 0], 10, axis=1)
     price += DARK_PRICE * np.maximum(darkest[:, None] - heavy[None, :, 0] - 0.08, 0)
     return price.astype(np.float32)
-
-
-def turning(sample: Floats, swatches: Swatches) -> Floats:
-    """What a crayon of another hue than the surface's costs (surfaces, crayons) where the box has
-    one of the hue.
-    """
-    hue = swatches.masstone()[:, 1:]
-    off = chord(hue[None, :, None], sample.swapaxes(1, 2)[:, None, :, 1:])
-    here = held(hue, sample.mean(2)[:, 1:])[:, None]
-    return (HUE_PRICE * here * np.percentile(off, OF_IT, axis=2)).astype(np.float32)
 
 
 def foreign(swatches: Swatches, width_rad: float) -> Floats:

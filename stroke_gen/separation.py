@@ -29,7 +29,8 @@ class Plan:
     """What stays the same from coat to coat: the scene, and the crayons that make its surfaces."""
 
     scene: Scene
-    swatches: Swatches
+    crayons: list[int]  # of the box
+    swatches: Swatches  # of these crayons
     mixtures: Mixtures
     pool: Executor  # over whose threads work is spread
 

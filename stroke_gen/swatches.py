@@ -44,7 +44,7 @@ class Swatches:
         return oklab(self.over(self.paper))[:, -1, 0]
 
     def upto(self, hardest: float) -> "Swatches":
-        """The table of a hand that presses no harder than `hardest` N/mm^2: two pressures or more."""
+        """The table up to `hardest` N/mm^2, the most of a hand; two pressures at least."""
         n = max(2, int((self.pressures <= hardest + 1e-6).sum()))
         return Swatches(
             self.names,

@@ -100,7 +100,7 @@ class Settings:
         return np.sqrt(light).astype(np.float32)
 
     def parsed(self) -> Settings:
-        """The same, with palette, paper, style and subject read; ValueError for one that there is not."""
+        """The same, with palette, paper, style and subject read; ValueError for what is not."""
         _ = self.box, self.ground, self.hand, self.mask
         return self
 

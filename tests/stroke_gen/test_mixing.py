@@ -136,8 +136,7 @@ def prices_of(scene, table, seed=0):
     hair.
     """
     sample = mixing._samples(scene.guide.lab, scene.family, np.random.default_rng(seed))
-    dear = mixing.prices(sample, table) + mixing.turning(sample, table)
-    return sample, dear + mixing.LAYER_PRICE
+    return sample, mixing.prices(sample, table) + mixing.LAYER_PRICE
 
 
 @pytest.mark.parametrize("names, pressures", [(("yellow", "blue"), (4, 2)),
@@ -301,7 +300,7 @@ def test_a_hue_of_some_of_the_surface_is_its_own(monkeypatch):
         prices = []
         for price in (0.0, 1.0):
             monkeypatch.setattr(mixing, "HUE_PRICE", price)
-            prices.append(mixing.turning(sample, table)[0])
+            prices.append(mixing.prices(sample, table)[0])
         yellow, blue, black = prices[1] - prices[0]
         assert (blue > 0.1) == dear and max(yellow, black) < 0.05
 

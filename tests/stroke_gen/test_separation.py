@@ -30,7 +30,8 @@ def plan_for(photo, family=None, table=TABLE, threads=2, layers=None):
     if layers is None:
         return plan_of(scene, POOLS[threads], table)
     rows = [[table.names.index(n) for n in row] + [-1] * (LAYERS - len(row)) for row in layers]
-    return Plan(scene, table, Mixtures(np.array(rows)), POOLS[threads])
+    every = list(range(len(table.names)))
+    return Plan(scene, every, table, Mixtures(np.array(rows)), POOLS[threads])
 
 
 def wanted(plan, now=None, turn=0, dark_price=0.3):
