@@ -397,7 +397,8 @@ def widths_on(radius, style):
 
 def test_a_small_subject_takes_finer_tips_than_a_large_one():
     """But no wider than the coat says, and not beyond what a tip can be."""
-    style = replace(load_style("artist"), passes=(replace(load_style("artist").passes[0], fine=0.6),))
+    style = load_style("artist")
+    style = replace(style, passes=(replace(style.passes[0], fine=0.6),))
     large, middle, small, tiny = (widths_on(r, style) for r in (26, 18, 8, 5))
     assert large == pytest.approx(style.passes[0].fine * style.tip_mm, rel=0.02)
     assert large > 1.1 * middle > 1.1 * small
