@@ -6,6 +6,7 @@ Importing this module is cheap; what is heavy is loaded by the first call.
 from __future__ import annotations
 
 import functools
+import json
 import logging
 import os
 from collections.abc import Callable
@@ -381,7 +382,7 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 
     def short(value: Any) -> str | int | float:
         if isinstance(value, dict):
-            return str(value.get("name", "custom"))
+            return json.dumps(value) if "extends" in value else str(value.get("name", "custom"))
         if isinstance(value, str):
             return Path(value).name
         return value if isinstance(value, int | float) else repr(value)
