@@ -245,7 +245,7 @@ def lift(w, held, table, b, carried):  # type: ignore[no-untyped-def]
 def stroke(w, held, table, points, carried):  # type: ignore[no-untyped-def]
     """A stroke over points (n, 3 or 5) from press to lift.
 
-    Returns the wax given, in um times cells; carried: by crayon, is added the wax that leaves with the tip.
+    Returns the wax given, in um times cells; carried: by crayon, is added what leaves with the tip.
     """
     given = 0.0
     for i in range(1, len(points)):

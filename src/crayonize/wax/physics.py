@@ -101,6 +101,7 @@ class Physics:
     lean: float
     # how much stronger the wax is coloured than that of crayons, for which palettes are given
     pigment: float
+    tip: float  # how broad the tips are that a drawing is planned with, against a crayon's
     usual: float  # mean of mu * sin(S, F) over a drawing, for the plan of wear
 
     def worn_per_newton_mm(self) -> float:
