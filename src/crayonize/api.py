@@ -312,7 +312,11 @@ def load_strokes(
             path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say
         )
     drawing = load_drawing(path)
-    return replace(drawing, palette=palette or drawing.palette, paper=paper or drawing.paper)
+    if palette is not None:
+        from .crayons.used import with_palette
+
+        drawing = with_palette(drawing, palette)
+    return replace(drawing, paper=paper or drawing.paper)
 
 
 def save_steps(
