@@ -6,6 +6,7 @@ Importing this module is cheap; what is heavy is loaded by the first call.
 from __future__ import annotations
 
 import functools
+import json
 import logging
 import os
 from collections.abc import Callable
@@ -311,7 +312,11 @@ def load_strokes(
             path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say
         )
     drawing = load_drawing(path)
-    return replace(drawing, palette=palette or drawing.palette, paper=paper or drawing.paper)
+    if palette is not None:
+        from .crayons.used import with_palette
+
+        drawing = with_palette(drawing, palette)
+    return replace(drawing, paper=paper or drawing.paper)
 
 
 def save_steps(
@@ -381,7 +386,7 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 
     def short(value: Any) -> str | int | float:
         if isinstance(value, dict):
-            return str(value.get("name", "custom"))
+            return json.dumps(value) if "extends" in value else str(value.get("name", "custom"))
         if isinstance(value, str):
             return Path(value).name
         return value if isinstance(value, int | float) else repr(value)
