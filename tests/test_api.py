@@ -124,6 +124,7 @@ def test_draw_takes_a_drawing_made_by_hand(tmp_path):
     ({"seed": True}, ValueError, "seed: true"),
     ({"threads": 0}, ValueError, "threads: 0"),
     ({"focus": [(0, 0, 1)]}, ValueError, "focus"),
+    ({"subject": "atuo"}, ValueError, "subject: 'atuo'"),
     ({"out": "/nowhere/out.png"}, ValueError, "nowhere"),
     ({"strokes": "strokes.csv"}, ValueError, ".json"),
 ], ids=str)  # fmt: skip
@@ -131,6 +132,27 @@ def test_bad_choice_is_named(photo, choices, error, words):
     with pytest.raises(error) as caught:
         crayonize.convert(photo, **choices)
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_subject_is_drawn_with_more_strokes_than_the_rest(tmp_path):
+    """The same texture everywhere: only the picture of the subject, a half, tells where care is."""
+    spots = np.random.default_rng(0).integers(60, 200, (24, 36)).astype(np.uint8)
+    photo = np.repeat(np.repeat(spots, 4, 0), 4, 1)
+    mask = np.zeros((12, 18), np.uint8)
+    mask[:, :9] = 255
+    Image.fromarray(mask).save(tmp_path / "left.png")
+    share = {}
+    for subject in ("none", mask, tmp_path / "left.png"):
+        named = subject if isinstance(subject, np.ndarray) else str(subject)
+        crayonize.convert(photo, strokes=tmp_path / "d.json", subject=named, **CHOICES)
+        lengths = np.zeros(2)
+        for stroke in load_drawing(tmp_path / "d.json").strokes:
+            step = np.hypot(*np.diff(stroke.path_mm, axis=0).T)
+            side = (stroke.path_mm[1:, 0] > 30).astype(int)
+            lengths += np.bincount(side, step, minlength=2)
+        share[str(named)] = lengths[0] / lengths.sum()
+    by_array, by_file = share[str(mask)], share[str(tmp_path / "left.png")]
+    assert by_array == by_file > share["none"] + 0.05
 
 
 def test_draw_checks_too(tmp_path):

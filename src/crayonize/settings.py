@@ -95,8 +95,11 @@ class Settings:
             return None if self.subject == "auto" else np.zeros((1, 1), np.float32)
         from .images.read import open_photo
 
-        with open_photo(self.subject) as picture:
-            light = picture.light(MASK_SIDE, (0.0, 0.0, 0.0)).mean(-1)
+        try:
+            with open_photo(self.subject) as picture:
+                light = picture.light(MASK_SIDE, (0.0, 0.0, 0.0)).mean(-1)
+        except ValueError as error:
+            raise ValueError(f"subject: {error} of the subject, or auto, or none") from error
         return np.sqrt(light).astype(np.float32)
 
     def parsed(self) -> Settings:
