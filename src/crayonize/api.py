@@ -186,6 +186,8 @@ def check_outputs(
     ValueError for what is wrong with a path, PermissionError for a folder that may not be written
     to.
     """
+    from stroke_gen.files import check_target, sweep
+
     from .images.write import file_format, same_file
 
     if out is not None:
@@ -206,6 +208,8 @@ def check_outputs(
             raise ValueError(f"{output}: the folder {folder} does not exist; create it first")
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(13, "its folder may not be written to", os.fspath(output))
+        check_target(output)
+        sweep(folder)
         taken.append(output)
 
 
@@ -311,7 +315,26 @@ def load_strokes(
             path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say
         )
     drawing = load_drawing(path)
+    _check_no_files(drawing, os.fsdecode(path), palette, paper)
     return replace(drawing, palette=palette or drawing.palette, paper=paper or drawing.paper)
+
+
+def _check_no_files(drawing: Drawing, where: str, palette: str | None, paper: str | None) -> None:
+    """ValueError if a drawing names files: it may be a stranger's, and they are ours."""
+    from .crayons.palette_files import is_file, palette_names
+    from .wax.paper import papers, strange
+
+    box = drawing.palette if isinstance(drawing.palette, str) else ""
+    found = {
+        "palette": (box if box and is_file(box) else "", [name for name, *_ in palette_names()]),
+        "paper": (strange(drawing.paper), list(papers())),
+    }
+    for what, (word, known) in found.items():
+        if word and (palette, paper)[what == "paper"] is None:
+            raise ValueError(
+                f"{where}: {what}: {quoted(word)} is none of ours{did_you_mean(word, known)}; a "
+                f"drawing names no files, give one with --{what}"
+            )
 
 
 def save_steps(

@@ -12,10 +12,8 @@ another run holds the folder; 130 Ctrl-C; 143 terminated.
 import atexit
 import gc
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 
 from stroke_gen.checks import printable
 
@@ -27,8 +25,6 @@ def main(words: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if words is None else words)
     # what is left at the end goes as a whole; to look through it first takes 0.2 s
     atexit.register(gc.freeze)
-    with suppress(ValueError):  # not in the main thread
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
