@@ -13,7 +13,8 @@ import numpy as np
 
 from crayonize.wax.sheet import Sheet
 
-LAYERS, THIN_UM = 4, 0.4  # as `columns` has them; own copies, so that a change there is noticed
+# as the kernels have them; own copies, so that a change there is noticed
+LAYERS, THIN_UM, SELDOM = 4, 0.4, 4
 
 NEIGHBOURS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
 
@@ -100,12 +101,59 @@ def balance(gaps: list[float], wanted: float) -> float:
     return (low + high) / 2
 
 
-def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1, yields=0.0):
-    """Fig. 7 for all cells in contact at once; returns what the crayon's own wax adds where.
+@dataclass
+class Load:
+    """Wax of other crayons that sticks to the tip: by crayon, and by cell of what it lies over.
 
-    Of the share nu that could move pull / (pull + yields) does, pull being the sum of Eq. 4.
+    regained: wax of its own, which is crayon again.
     """
-    own, others, blends = {}, {}, []
+
+    crayons: dict[int, dict] = field(default_factory=dict)
+    regained: float = 0.0
+
+    def height(self, at) -> float:
+        return sum(cells.get(at, 0.0) for cells in self.crayons.values())
+
+    def moved(self, dy: int, dx: int) -> "Load":
+        """The same load, with the tip elsewhere."""
+        return Load(
+            {
+                crayon: {(y + dy, x + dx): h for (y, x), h in cells.items()}
+                for crayon, cells in self.crayons.items()
+            },
+            self.regained,
+        )
+
+
+def stick(column, at, moved, wax, c, load: Load) -> float:
+    """A share of `moved`, the more the thicker the film, off the top layer; returns how much."""
+    if not column.layers:
+        return 0.0
+    crayon, there = column.layers[-1]
+    film, half = column.wax(), float(c.peel if crayon == wax else c.carve)
+    wanted = float(c.sticks) * film**2 / (film**2 + half**2) * moved
+    full = crayon not in load.crayons and len(load.crayons) == LAYERS
+    if wanted < 1e-4 or (full and crayon != wax):
+        return 0.0
+    part = min(wanted, there)
+    if crayon == wax:
+        load.regained += part
+    else:
+        cells = load.crayons.setdefault(crayon, {})
+        cells[at] = cells.get(at, 0.0) + part
+    column.layers[-1][1] -= part
+    if part == there:
+        column.layers.pop()
+    return part
+
+
+def smear(columns, over, tops, direction, wax, nu, c, optics, reach, own, load):
+    """Fig. 7 for all cells in contact at once; adds to `own` what the crayon's own wax adds where.
+
+    Of the share nu that could move pull / (pull + yields) does, pull being the sum of Eq. 4; part
+    of it sticks to the tip, to its `load`.
+    """
+    others, blends = {}, []
     for (y, x), overlap in over.items():
         standing = min(columns[y, x].wax(), overlap)
         if standing <= 1e-3:
@@ -116,12 +164,14 @@ def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1,
             if to in columns:
                 distance = math.hypot(dy, dx)
                 cosine = (dx * direction[0] + dy * direction[1]) / distance
-                pull = (alpha * (tops[y, x] - tops[to]) + beta * cosine) / distance
+                pull = (c.alpha * (tops[y, x] - tops[to]) + c.beta * cosine) / distance
                 weight[to] = max(0.0, pull)
         if not sum(weight.values()):
             continue
         pull = sum(weight.values())
-        moved = nu * standing * pull / (pull + yields)
+        moved = nu * standing * pull / (pull + c.yields)
+        if c.sticks > 0:
+            moved -= stick(columns[y, x], (y, x), moved, wax, c, load)
         lifted, from_blend = take(columns[y, x], moved)
         for to, w in weight.items():
             share = w / sum(weight.values())
@@ -132,12 +182,43 @@ def smear(columns, over, tops, direction, wax, nu, alpha, beta, optics, reach=1,
                     arrives = others.setdefault(crayon, {})
                     arrives[to] = arrives.get(to, 0.0) + share * height
             blends.append((to, share * from_blend))
-    for crayon, arrives in others.items():
-        for to, height in arrives.items():
-            add(columns[to], crayon, height, optics)
     for to, part in blends:
         columns[to].blend = columns[to].blend + part
-    return own
+    return others
+
+
+def lay(columns, arriving, optics):
+    """Lay wax on its way, by crayon and cell, in order."""
+    for crayon, arrives in arriving.items():
+        for to, height in arrives.items():
+            if height > 0:
+                add(columns[to], crayon, height, optics)
+
+
+def give_back(broken, load: Load, covers: float, arriving) -> None:
+    """Where `broken` um break off, load comes with it, as if among `covers` um of own wax."""
+    for at in broken:
+        height = load.height(at)
+        if height <= 0.01:
+            continue
+        share = min(broken[at] / (height + covers), 1.0)
+        for crayon, cells in load.crayons.items():
+            part = share * cells.get(at, 0.0)
+            if part > 0:
+                cells[at] -= part
+                to = arriving.setdefault(crayon, {})
+                to[at] = to.get(at, 0.0) + part
+        broken[at] = max(broken[at] - share * height, 0.0)
+
+
+def wear_around(mask, lost, share, brings):
+    """Lower a mask by `share` of what was lost, spread over the neighbours as a tent."""
+    far = math.ceil(brings) - 1
+    tent = [1 - abs(k) / brings for k in range(-far, far + 1)]
+    spread = np.outer(tent, tent) / sum(tent) ** 2
+    for (y, x), height in lost.items():
+        for j, i in np.ndindex(spread.shape):
+            mask[y + j - far, x + i - far] += share * spread[j, i] * height
 
 
 def ahead(y, x, direction):
@@ -160,17 +241,19 @@ def height_ahead(tops, y, x, direction) -> tuple[float, float]:
     return rise, way
 
 
-def deposit(columns, over, tops, before, direction, own, mask, push, rate, c):
-    """Fig. 6 for all cells in contact: what breaks off joins `own` and wears `mask`; returns the
-    loss.
+def break_off(columns, over, tops, before, direction, arriving, push, rate, c):
+    """Fig. 6 for all cells in contact: what breaks off where.
 
     before: wax of each cell before it was smeared; a cell's overlap changes by the firm share of
-        what came and went.
+        what came and went. arriving: wax on its way, by crayon and cell.
     """
     film, mu_paper, mu_wax, relief = (float(v) for v in (c.film, c.mu_paper, c.mu_wax, c.relief))
-    wear, heap, firm = float(c.wear), float(c.heap), float(c.firm)
-    now = {cell: column.wax() + own.get(cell, 0.0) for cell, column in columns.items()}
-    lost = 0.0
+    heap, firm = float(c.heap), float(c.firm)
+    now = {cell: column.wax() for cell, column in columns.items()}
+    for arrives in arriving.values():
+        for cell, height in arrives.items():
+            now[cell] += height
+    broken = {}
     for cell, overlap in over.items():
         room = overlap + firm * (now[cell] - before[cell]) - heap * now[cell]
         rise, way = height_ahead(tops, *cell, direction)
@@ -181,11 +264,8 @@ def deposit(columns, over, tops, before, direction, own, mask, push, rate, c):
             film + sum(share * now.get(to, 0.0) for to, share in ahead(*cell, direction))
         )
         mu = bare * mu_paper + (1 - bare) * mu_wax
-        given = min(rate * mu * sine, 1.0) * room
-        own[cell] = own.get(cell, 0.0) + given
-        mask[cell] += wear * given
-        lost += given
-    return lost
+        broken[cell] = min(rate * mu * sine, 1.0) * room
+    return broken
 
 
 def under_tip(columns, mask, top, left, firm=1.0):
@@ -208,13 +288,12 @@ def hop(number: int, mean: float, scatter: float) -> int:
     return max(1, math.floor(mean + 0.5 + scatter * (2 * luck(number) - 1)))
 
 
-def grip(begun, along: float) -> float:
-    """How much more than usual the crayon sticks to the paper: straight lines between a throw at
+def grip(own: int, along: float) -> float:
+    """How much more than usual stroke `own` sticks to the paper: straight lines between a throw at
     each length.
     """
-    x, y = (math.floor(4 * v) for v in begun)
-    stroke, step = 7919 * x + 104729 * y, math.floor(along)
-    return 2 * np.interp(along - step, [0, 1], [luck(stroke + step), luck(stroke + step + 1)]) - 1
+    step = math.floor(along)
+    return 2 * np.interp(along - step, [0, 1], [luck(own + step), luck(own + step + 1)]) - 1
 
 
 def contacts(points, stride):
@@ -232,10 +311,11 @@ def contacts(points, stride):
         )
 
 
-def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, reach=1):
+def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, number, reach=1):
     """One stroke as in Fig. 3: at each point adjust the height, smear, deposit.
 
-    Returns the wax given.
+    It knows neither clumps nor grains. number: the stroke's own. Returns the wax given, and what
+    left with the tip by crayon.
     """
     c = constants
     points, mask = points.astype(float), mask.astype(float)
@@ -248,7 +328,7 @@ def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, reach
     if not touches:
         length = np.hypot(*np.diff(points[:, :2], axis=0).T).sum()
         stride, touches = max(length, 0.04 * extent), [(points[-1].tolist(), (1.0, 0.0))]
-    given, contact = 0.0, 0
+    given, contact, load, lost, at = 0.0, 0, Load(), {}, (0, 0)
     for n, ((x, y, force), direction) in enumerate(touches):
         if force <= 0:
             continue
@@ -261,39 +341,35 @@ def rub(columns, points, mask, wax, smears, constants, per_lambda, optics, reach
         gaps = under_tip(columns, mask, top, left, float(c.firm))
         if not gaps:
             continue
-        held = 1 + float(c.slip) * grip(
-            np.float32(touches[0][0][:2]) / c.slip_cells, n * stride / float(c.slip_cells)
-        )
+        load, at = load.moved(top - at[0], left - at[1]), (top, left)
+        held = 1 + float(c.slip) * grip(number, n * stride / float(c.slip_cells))
         wanted = force * per_lambda * held * len(gaps) / int((mask < 1e8).sum())
         h = balance(list(gaps.values()), min(wanted, float(c.most) * len(gaps)))
         over = {cell: gap - h for cell, gap in gaps.items() if gap > h}
         tops = {cell: column.top(float(c.firm)) for cell, column in columns.items()}
-        before, own = {cell: column.wax() for cell, column in columns.items()}, {}
+        before = {cell: column.wax() for cell, column in columns.items()}
+        own, others = {}, {}
         if smears:
             nu = 1 - (1 - float(c.nu)) ** stride
             cells = hop(n, float(c.hop), float(c.scatter))
-            own = smear(
-                columns,
-                over,
-                tops,
-                direction,
-                wax,
-                nu,
-                c.alpha,
-                c.beta,
-                optics,
-                cells,
-                float(c.yields),
-            )
-        worn = {cell: mask[cell[0] - top, cell[1] - left] for cell in over}
+            others = smear(columns, over, tops, direction, wax, nu, c, optics, cells, own, load)
         push, rate = float(c.push) if c.push > 0 else force, float(c.rate) * stride
-        given += deposit(columns, over, tops, before, direction, own, worn, push, rate, c)
-        for cell, height in worn.items():
-            mask[cell[0] - top, cell[1] - left] = height
-        for cell, height in own.items():
-            if height > 0:
-                add(columns[cell], wax, height, optics)
-    return given
+        arriving = {**others, wax: own}
+        broken = break_off(columns, over, tops, before, direction, arriving, push, rate, c)
+        give_back(broken, load, float(c.covers), others)
+        for cell, height in broken.items():
+            own[cell] = own.get(cell, 0.0) + height
+            under = cell[0] - top, cell[1] - left
+            mask[under] += float(c.wear) * height
+            lost[under] = lost.get(under, 0.0) + height
+            given += height
+        if c.brings > 1 and contact % SELDOM == 0:
+            wear_around(mask, lost, float(c.around), float(c.brings))
+            lost = {}
+        lay(columns, {**others, wax: own}, optics)
+    return given - load.regained, {
+        crayon: sum(cells.values()) for crayon, cells in load.crayons.items()
+    }
 
 
 def over(ground: float, kh: float, sh: float) -> float:

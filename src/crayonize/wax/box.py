@@ -33,8 +33,10 @@ class Box:
         self.reach = constants.reach(cell_mm)
         self.worn_um: dict[tuple[str, Tip], float] = {}  # mean height lost since the drawing began
         self.given_mm3: dict[str, float] = {}
+        self.carried_mm3: dict[str, float] = {}  # by crayon: wax that left the sheet on tips
         # by crayon: how often a tip was turned or sharpened
         self.sharpened: Counter[str] = Counter()
+        self.drawn: Counter[str] = Counter()  # by crayon: strokes since the drawing began
         self.masks: list[NDArray[np.float32]] = []
         self._index: dict[tuple[Tip, int, int, int], int] = {}
 
@@ -69,6 +71,20 @@ class Box:
             numbers = [self._number(shape, *self._look(kind)) for kind in kinds.tolist()]
             taken[mine] = np.array(numbers)[which]
         return taken
+
+    def own_number(self, crayon: str) -> int:
+        """A number for the crayon's next stroke, from which all that happens by chance follows."""
+        number = self.drawn[crayon] * 7919 + self.palette.index(crayon) * 104729 * 7919
+        self.drawn[crayon] += 1
+        return number
+
+    def book(self, crayon: str, given: float, carried: NDArray[np.float64]) -> None:
+        """Count the wax a stroke gave, and what left on its tip, by crayon; in um times cells."""
+        mm3 = self.cell_mm**2 / 1000
+        self.given_mm3[crayon] = self.given_mm3.get(crayon, 0.0) + given * mm3
+        for index in np.flatnonzero(carried):
+            name = self.palette.crayons[index].name
+            self.carried_mm3[name] = self.carried_mm3.get(name, 0.0) + float(carried[index]) * mm3
 
     @staticmethod
     def _look(kind: int) -> tuple[int, int, int]:

@@ -11,23 +11,30 @@ import numpy as np
 from stroke_gen.jit import inner_kernel, lean_kernel
 
 from .columns import Columns
-from .deposit import deposit
+from .deposit import break_off, lay_ready
 from .force import balance, overlap
+from .grains import scratch
+from .load import carry_off, drop, give_back, luck
 from .physics import Constants
-from .smear import open_slot, settle, smear, weigh
+from .smear import settle, smear, weigh
 from .window import (
     AHEAD,
+    CARRIED,
     CONTACTS,
     DITHER_X,
     DITHER_Y,
+    GRITTY,
     HEIGHT,
     OWN,
     PRESENT,
+    REGAINED,
     SPREAD_XX,
     SPREAD_XY,
     SPREAD_YY,
     WALKED,
+    WORN,
     look,
+    open_slot,
 )
 
 # how far a dab slides, in extents of its tip: the least that leaves a mark in every tooth
@@ -59,9 +66,11 @@ class Held(NamedTuple):
 
 
 @lean_kernel
-def press(w, mask, wax, side, reach, cols):  # type: ignore[no-untyped-def]
+def press(w, mask, wax, side, reach, cols, own):  # type: ignore[no-untyped-def]
     """Put a tip on a sheet `cols` cells wide: the beginning of a stroke; returns the crayon as it
     is held.
+
+    own: the stroke's number, from which all that happens by chance follows.
     """
     present, mx, my, xx, xy, yy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(side):
@@ -69,12 +78,14 @@ def press(w, mask, wax, side, reach, cols):  # type: ignore[no-untyped-def]
             at = j * side + i
             w.where[at] = j * cols + i
             w.mask[at] = mask[at]
+            w.loaded[at] = w.lost[at] = 0
             if mask[at] < PRESENT:
                 present += 1
                 mx, my, xx, xy, yy = mx + i, my + j, xx + i * i, xy + i * j, yy + j * j
     w.hand[:] = 0.5
     w.hand[HEIGHT] = 1e9  # lifted: from far below, float32 would miss the paper
-    w.hand[WALKED] = w.hand[CONTACTS] = 0
+    w.hand[WALKED] = w.hand[CONTACTS] = w.hand[CARRIED] = w.hand[GRITTY] = w.hand[WORN] = 0
+    w.hand[OWN] = own
     mx, my = mx / present, my / present
     w.hand[SPREAD_XX] = xx / present - mx * mx
     w.hand[SPREAD_XY] = xy / present - mx * my
@@ -94,21 +105,13 @@ def _extent(w, vx, vy):  # type: ignore[no-untyped-def]
 
 
 @inner_kernel
-def _luck(number):  # type: ignore[no-untyped-def]
-    """From 0 up to 1 for each whole number, in no order (Knuth's multiplicative hash, twice)."""
-    once = (number * 2654435761) & 0xFFFFFFFF
-    twice = ((once ^ (once >> 15)) * 2654435761) & 0xFFFFFFFF
-    return np.float32(twice >> 16) / np.float32(65536)
-
-
-@inner_kernel
 def _hop(contact, mean, scatter):  # type: ignore[no-untyped-def]
     """How many cells smeared wax goes at a contact: `mean`, by chance up to `scatter` more or less.
 
     Wax that always went equally far would part the cells into lattices; a pattern would show as a
     ladder.
     """
-    chance = scatter * (np.float32(2) * _luck(contact) - np.float32(1))
+    chance = scatter * (np.float32(2) * luck(contact) - np.float32(1))
     return max(1, int(np.floor(mean + np.float32(0.5) + chance)))
 
 
@@ -121,8 +124,8 @@ def _grip(own, along):  # type: ignore[no-untyped-def]
     """
     step = np.int64(along)
     part = np.float32(along - step)
-    luck = (np.float32(1) - part) * _luck(own + step) + part * _luck(own + step + 1)
-    return np.float32(2) * luck - np.float32(1)
+    chance = (np.float32(1) - part) * luck(own + step) + part * luck(own + step + 1)
+    return np.float32(2) * chance - np.float32(1)
 
 
 @lean_kernel
@@ -134,10 +137,6 @@ def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyp
     contact = np.int64(w.hand[CONTACTS])
     w.hand[CONTACTS] += 1
 
-    # Strokes that begin a quarter of a slip apart stick and slip each in its own way.
-    if contact == 0:
-        per_cell = np.float32(4) / c.slip_cells
-        w.hand[OWN] = np.floor(x * per_cell) * 7919 + np.floor(y * per_cell) * 104729
     if force <= 0:
         return np.float32(0)
 
@@ -162,14 +161,22 @@ def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyp
 
     # Wax that stands in its way is pushed aside, then more is rubbed off, and all of it laid on.
     home, slots = top * table.cols + left, 1
+    w.hand[REGAINED] = 0
     open_slot(w, cells, 0, held.wax, 0)
     w.end[0] = cells
     if table.smears:
         hop = _hop(contact, c.hop, c.scatter)
         weigh(w, side, hop, vx, vy, c.alpha, c.beta)
-        slots = smear(w, side, hop, home, one - (one - c.nu) ** stride, c.yields, table.columns)
-    given = deposit(w, side, held.reach, vx, vy, c.push if c.push > 0 else force, stride, c)
+        slots = smear(w, side, hop, home, one - (one - c.nu) ** stride, c, table.columns)
+    break_off(w, side, held.reach, vx, vy, c.push if c.push > 0 else force, stride, c)
+    if w.hand[CARRIED] > 0:
+        slots = give_back(w, side, held.reach, slots, c.covers)
+        slots = drop(w, side, held.reach, held.present, stride, slots, c)
+    given = lay_ready(w, side, held.reach, c) - w.hand[REGAINED]
     settle(w, slots, home, c.thin, table.columns)
+    if c.grains > 0:
+        along, across = _extent(w, vx, vy), _extent(w, -vy, vx)
+        given += scratch(w, held, table, x, y, vx, vy, stride, along, across)
     return given
 
 
@@ -198,22 +205,27 @@ def move(w, held, table, a, b):  # type: ignore[no-untyped-def]
 
 
 @lean_kernel
-def lift(w, held, table, b):  # type: ignore[no-untyped-def]
+def lift(w, held, table, b, carried):  # type: ignore[no-untyped-def]
     """End a stroke at point b; one so short that nothing touched becomes a dab.
 
-    Returns the wax given.
+    Returns the wax given; carried: by crayon, is added the wax that leaves with the tip.
     """
-    if w.hand[CONTACTS] > 0:
-        return 0.0
-    across = np.float32(1)
-    slides = max(np.float32(w.hand[WALKED]), DAB * _extent(w, across, np.float32(0)))
-    return np.float64(touch(w, held, table, b[0], b[1], b[2], across, np.float32(0), slides))
+    given = 0.0
+    if w.hand[CONTACTS] == 0:
+        across, still = np.float32(1), np.float32(0)
+        slides = max(np.float32(w.hand[WALKED]), DAB * _extent(w, across, still))
+        given += touch(w, held, table, b[0], b[1], b[2], across, still, slides)
+    carry_off(w, held.side, carried)
+    return given
 
 
 @lean_kernel
-def stroke(w, held, table, points):  # type: ignore[no-untyped-def]
-    """A stroke over points (n, 3) from press to lift; returns the wax given, in um times cells."""
+def stroke(w, held, table, points, carried):  # type: ignore[no-untyped-def]
+    """A stroke over points (n, 3) from press to lift; returns the wax given, in um times cells.
+
+    carried: by crayon, is added the wax that leaves with the tip.
+    """
     given = 0.0
     for i in range(1, len(points)):
         given += move(w, held, table, points[i - 1], points[i])
-    return given + lift(w, held, table, points[len(points) - 1])
+    return given + lift(w, held, table, points[len(points) - 1], carried)

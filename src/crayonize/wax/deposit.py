@@ -4,15 +4,15 @@ import numpy as np
 
 from stroke_gen.jit import inner_kernel, lean_kernel, lean_sum_kernel
 
+from .window import WORN
+
+SELDOM = 4  # contacts after which the tip is worn down
 CLIFF = np.float32(1e6)  # um; a rise like this is the edge of the sheet
 
 
 @lean_kernel
-def deposit(w, side, reach, vx, vy, push, stride, c):  # type: ignore[no-untyped-def]
-    """Rub wax off the tip over `stride` cells of the way; returns the tip's loss in um times cells.
-
-    c: the `Constants`. What breaks off joins slot 0 and deepens the mask by c.wear of it.
-    """
+def break_off(w, side, reach, vx, vy, push, stride, c):  # type: ignore[no-untyped-def]
+    """What breaks off the tip over `stride` cells of the way, into `broken`. c: the `Constants`."""
     # One cell ahead along the longer axis (P'): it lies between two cells of the window.
     longest = max(abs(vx), abs(vy))
     ax, ay = vx / longest, vy / longest
@@ -24,7 +24,6 @@ def deposit(w, side, reach, vx, vy, push, stride, c):  # type: ignore[no-untyped
 
     a = reach * side + reach
     b = side * side - a
-    inflow, broken = w.arriving[a:b], w.broken[a:b]
     _break_off(
         w.surface[a:b],
         w.surface[a + ahead : b + ahead],
@@ -43,9 +42,28 @@ def deposit(w, side, reach, vx, vy, push, stride, c):  # type: ignore[no-untyped
         c.relief,
         c.heap,
         c.firm,
-        broken,
+        w.broken[a:b],
     )
-    return _wear(broken, c.wear, inflow, w.mask[a:b])
+
+
+@lean_kernel
+def lay_ready(w, side, reach, c):  # type: ignore[no-untyped-def]
+    """What broke off joins slot 0, and wears the mask; returns the tip's loss in um times cells.
+
+    A cell takes its neighbours along that lie within `c.brings` cells, with c.wear of its loss in
+    all; as they hardly change from contact to contact, that is done once in SELDOM of them.
+    """
+    a = reach * side + reach
+    b = side * side - a
+    broken, inflow = w.broken[a:b], w.arriving[a:b]
+    given = _lose(broken, c.wear, inflow, w.mask[a:b], w.lost[a:b])
+    if c.brings <= 1:
+        return given
+    w.hand[WORN] += 1
+    if w.hand[WORN] >= SELDOM:
+        w.hand[WORN] = 0
+        _wear_down(w, side, reach, c)
+    return given
 
 
 @inner_kernel
@@ -82,13 +100,44 @@ def _break_off(here, ahead, aside, film, film_ahead, film_aside,  # type: ignore
 
 
 @lean_sum_kernel
-def _wear(broken, wear, inflow, mask):  # type: ignore[no-untyped-def]
-    """Make what broke off ready to be laid, and deepen the mask by `wear` of it; returns its
-    sum.
-    """
-    lost = np.float32(0)
+def _lose(broken, share, inflow, mask, loss):  # type: ignore[no-untyped-def]
+    """Make what broke off ready to be laid, and book `share` of it as lost; returns its sum."""
+    total = np.float32(0)
     for i in range(broken.size):
         inflow[i] += broken[i]
-        mask[i] += wear * broken[i]
-        lost += broken[i]
-    return lost
+        mask[i] += share * broken[i]
+        loss[i] += broken[i]
+        total += broken[i]
+    return total
+
+
+@lean_kernel
+def _wear_down(w, side, reach, c):  # type: ignore[no-untyped-def]
+    """Spread what was lost over the neighbours, and lower the mask by it.
+
+    It falls evenly with distance along rows and along columns. Were neighbours taken along alike, a
+    cell that stands out would not be worn more than they, and single cells would grow out of the
+    tip.
+    """
+    far = min(np.int64(np.ceil(c.brings)) - 1, reach)
+    a, ends = far * side + far, side * side
+    total = np.float32(0)
+    for k in range(-far, far + 1):
+        total += np.float32(1) - abs(k) / c.brings
+    for at in range(ends):
+        w.lowered[at] = 0
+    for k in range(-far, far + 1):
+        share = (np.float32(1) - abs(k) / c.brings) / total
+        _plus(w.lowered[a : ends - a], w.lost[a + k : ends - a + k], share)
+    for k in range(-far, far + 1):
+        share = c.around * (np.float32(1) - abs(k) / c.brings) / total
+        to = k * side
+        _plus(w.mask[a : ends - a], w.lowered[a + to : ends - a + to], share)
+    for at in range(ends):
+        w.lost[at] = 0
+
+
+@inner_kernel
+def _plus(total, more, share):  # type: ignore[no-untyped-def]
+    for i in range(more.size):
+        total[i] += share * more[i]

@@ -118,11 +118,11 @@ class Live:
         """
         for array in self.easel.sheet.columns():
             array[::1024] += 0  # memory comes page by page, each when it is first written to
-        hand = _Hand(
-            self.easel, Stroke(*_point(0, 0, 0), self.easel.box.palette.crayons[0].name, Tip())
-        )
+        crayon = self.easel.box.palette.crayons[0].name
+        hand = _Hand(self.easel, Stroke(*_point(0, 0, 0), crayon, Tip()))
         self._change(hand, hand.move(*_point(1, 0, 0)))
         hand.lift()
+        self.easel.box.drawn[crayon] -= 1  # it was none of the drawing's
 
     def _held(self, what: str) -> "_Hand":
         if not self._hand:
@@ -163,6 +163,8 @@ class _Hand:
         self._path, self._force = [dab.path_mm], [dab.force_n]
         self._drawn = 0  # number of the point up to which the stroke is drawn
         self._given = 0.0  # wax, in um times cells
+        # that leaves on the tip, by crayon
+        self._carried = np.zeros(len(easel.box.palette.crayons))
 
     def stroke(self, since: int = 0) -> Stroke:
         """The stroke, or what of it begins with one of its points."""
@@ -187,7 +189,7 @@ class _Hand:
         if not self.side:
             self._put_down()
         points = self._draw()
-        self._given += lift(self._desk, self._held, self._table, points[-1])
+        self._given += lift(self._desk, self._held, self._table, points[-1], self._carried)
         self._book()
         return points
 
@@ -199,8 +201,10 @@ class _Hand:
         (number,) = box.take([stroke], np.zeros(1), self._heading)
         mask = box.masks[number]
         self._desk, self.side = window(mask.size, len(box.palette.crayons)), mask.shape[0]
-        cols = self.easel.sheet.cols
-        self._held: Held = press(self._desk, mask.ravel(), self._wax, self.side, box.reach, cols)
+        cols, own = self.easel.sheet.cols, box.own_number(stroke.crayon)
+        self._held: Held = press(
+            self._desk, mask.ravel(), self._wax, self.side, box.reach, cols, own
+        )
 
     def _draw(self) -> Floats:
         """Draw on to the last point; returns in cells where the way began and all points passed."""
@@ -215,9 +219,7 @@ class _Hand:
         box, cell_mm, stroke = self.easel.box, self.easel.sheet.cell_mm, self.stroke()
         newton_cells, _, _ = ways(*in_cells([stroke], cell_mm))
         box.take([stroke], newton_cells * cell_mm, self._heading)
-        box.given_mm3[stroke.crayon] = (
-            box.given_mm3.get(stroke.crayon, 0.0) + self._given * cell_mm**2 / 1000
-        )
+        box.book(stroke.crayon, self._given, self._carried)
 
 
 def _point(x_mm: float, y_mm: float, force_n: float) -> tuple[Floats, Floats]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 WHOLE = 1.25  # hops of fewer cells than this go to the next cell
+FINEST = 0.6  # cells; a track narrower than this could not be drawn
 THIN_UM = 0.4  # a thinner film is dust: it counts as one with the layer beneath it, and sinks first
 
 
@@ -35,6 +36,19 @@ class Constants(NamedTuple):
     most: np.float32  # mean overlap over the tip, um
     epsilon: np.float32  # um
     wear: np.float32
+    around: np.float32
+    brings: np.float32  # cells on each side that a cell takes along as it wears
+    sticks: np.float32
+    carve: np.float32  # um
+    peel: np.float32  # um
+    covers: np.float32  # um
+    clump: np.float32  # um
+    site: np.float32  # radius of a clump, in cells
+    way: np.float32  # from clump to clump, in cells
+    grains: np.float32  # that come out for each cell drawn over
+    lasts: np.float32  # cells
+    track: np.float32  # its deviation, in cells
+    speck: np.float32  # um
     thin: np.float32  # um
     heap: np.float32
     firm: np.float32
@@ -67,8 +81,21 @@ class Physics:
     slip: float  # share of the force that comes and goes as the crayon sticks and slips ...
     slip_mm: float  # ... over this length
     step: float  # from one contact to the next, as a share of the tip's extent; 0: cell by cell
-    # share of a cell's loss that deepens the cell itself; the rest the whole tip shares
+    # share of a cell's loss that deepens the tip around it; the rest the whole tip shares
     wear: float
+    around: float
+    wear_mm: float  # ... as far as this to each side; 0: the cell itself
+    sticks: float  # share of thick displaced wax that sticks to the tip ...
+    carve_um: float  # ... and of half as much from a film of this height
+    peel_um: float  # ... and where it is its own wax, which lies better
+    covers_um: float  # load that halves what the crayon gives of its own wax
+    clump_um: float  # mean load that comes off as a clump
+    clump_mm: float  # way from clump to clump, where there is so much
+    site_mm: float  # radius of the place it comes from
+    grains_per_cm2: float  # hard grains that come out of the tip, by the area drawn over
+    grain_mm: float  # way that they last, on average
+    track_mm: float  # deviation across the tracks that they leave
+    speck_um: float  # height of the specks where they are lost
     # how much stronger the wax is coloured than that of crayons, for which palettes are given
     pigment: float
     usual: float  # mean of mu * sin(S, F) over a drawing, for the plan of wear
@@ -118,6 +145,19 @@ class Physics:
             "most": self.bears / self.lam,
             "epsilon": self.epsilon_um,
             "wear": self.wear,
+            "around": self.around,
+            "brings": self.wear_mm / cell_mm,
+            "sticks": self.sticks,
+            "carve": self.carve_um,
+            "peel": self.peel_um,
+            "covers": self.covers_um,
+            "clump": self.clump_um,
+            "site": self.site_mm / cell_mm,
+            "way": self.clump_mm / cell_mm,
+            "grains": self.grains_per_cm2 * cell_mm**2 / 100,
+            "lasts": self.grain_mm / cell_mm,
+            "track": max(self.track_mm / cell_mm, FINEST),
+            "speck": self.speck_um,
             "thin": THIN_UM,
             "heap": self.heap,
             "firm": self.firm,

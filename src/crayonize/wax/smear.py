@@ -10,7 +10,8 @@ import numpy as np
 from stroke_gen.jit import inner_kernel, lean_kernel
 
 from .columns import BLEND, LAYERS, add, whole
-from .window import NONE, neighbour, step
+from .load import stick
+from .window import NONE, neighbour, open_slot, step
 
 STANDING = np.float32(1e-3)  # um; less than this is not pushed on
 FAINT = np.float32(1e-4)  # a weaker pull is none: shares of it would be too small for a float32
@@ -66,13 +67,13 @@ def weigh(w, side, hop, vx, vy, alpha, beta):  # type: ignore[no-untyped-def]
 
 
 @lean_kernel
-def smear(w, side, hop, home, nu, yields, columns):  # type: ignore[no-untyped-def]
+def smear(w, side, hop, home, nu, c, columns):  # type: ignore[no-untyped-def]
     """Push standing wax to the neighbours `hop` cells away (Fig. 7); returns the slots in use.
 
     Of what stands the share nu * pull / (pull + yields) goes, where `pull` is the sum of weights.
     Fig. 7 moves nu of it however small the pull (yields = 0): past the level that it seeks, and
     back at the next contact, which leaves a grain of single cells. Pure wax is on its way in
-    `arriving` when this returns; the blend has already arrived.
+    `arriving` when this returns; the blend has already arrived. c: the `Constants`.
     """
     size, edge = w.film.size, hop * side + hop
 
@@ -89,8 +90,12 @@ def smear(w, side, hop, home, nu, yields, columns):  # type: ignore[no-untyped-d
         standing, pull = min(w.film[at], w.over[at]), w.weights[at]
         if standing <= STANDING or pull <= 0:
             continue
-        moved = nu * standing * pull / (pull + yields)
+        moved = nu * standing * pull / (pull + c.yields)
         cell = whole(home + w.where[at])
+        if c.sticks > 0:
+            stuck = stick(w, side, at, cell, moved, c, columns)
+            w.film[at] -= stuck
+            moved -= stuck
         missing, slots = _take(w, side * side, slots, at, cell, moved, 1 / pull, columns)
         if missing > 0:
             missing = _take_blend(w, side, hop, at, cell, missing, 1 / pull, columns.blend)
@@ -115,19 +120,6 @@ def smear(w, side, hop, home, nu, yields, columns):  # type: ignore[no-untyped-d
     if high:
         _blend_in(w, low - edge, high + edge, home, columns.total, columns.blend)
     return slots
-
-
-@lean_kernel
-def open_slot(w, cells, slot, wax, begin):  # type: ignore[no-untyped-def]
-    """Give a crayon the next slot, empty."""
-    w.slot_of[wax] = slot
-    w.crayon_of[slot] = wax
-    w.begin[slot] = begin
-    plane = whole(slot * w.film.size)
-    for at in range(cells):
-        w.taken[plane + at] = 0
-    for at in range(cells):
-        w.arriving[plane + at] = 0
 
 
 @inner_kernel

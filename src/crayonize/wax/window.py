@@ -18,18 +18,21 @@ from .columns import BLEND, whole
 NONE = 255  # no slot
 PRESENT = np.float32(1e8)  # um; cells of a tip's mask that stand higher are no part of it
 
+LOADS = 4  # crayons whose wax a tip carries at most
+GRAINS = 6  # hard grains that stand out of a tip at most
+
 # What `hand` holds: height of the tip (um), offsets (cells), strides to the next contact, cells
-# walked, contacts so far, the stroke's own number, and how the tip spreads about its middle
-# (cells^2).
-HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS, OWN, SPREAD_XX, SPREAD_XY, SPREAD_YY = range(
-    10
-)
+# walked, contacts so far, the stroke's own number, how many crayons' wax sticks to the tip, what it
+# regained of its own at this contact (um), how many grains stand out of it, contacts since it was
+# worn down, and how it spreads about its middle (cells^2).
+HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS, OWN, CARRIED, REGAINED, GRITTY = range(10)
+WORN, SPREAD_XX, SPREAD_XY, SPREAD_YY = range(10, 14)
 
 Floats = NDArray[np.float32]
 
 
 class Window(NamedTuple):
-    """A thread's work space. All but the last five hold values for each cell of the window, row by
+    """A thread's work space. Up to `arriving` it holds values for each cell of the window, row by
     row.
 
     Wax on its way is sorted by crayon: each crayon met at a contact gets a slot, the one in hand
@@ -46,6 +49,11 @@ class Window(NamedTuple):
     weights: Floats  # sum of Eq. 4 over the neighbours
     weight: Floats  # Eq. 4, for one neighbour after the other
     broken: Floats  # what breaks off
+    lost: Floats  # what broke off since the tip was worn down
+    lowered: Floats  # how far it is worn down, on the way there
+    load: Floats  # wax that sticks to the tip: LOADS planes, one for each crayon carried
+    loaded: Floats  # their sum
+    share: Floats  # of the load that comes off
     blended: Floats  # blend that arrives: BLEND values a cell
     taken: Floats  # wax that leaves over the sum of weights, for one slot after the other
     arriving: Floats  # wax that comes, likewise
@@ -53,6 +61,9 @@ class Window(NamedTuple):
     crayon_of: NDArray[np.uint8]  # by slot
     begin: NDArray[np.int64]  # by slot: cells between which it holds anything
     end: NDArray[np.int64]
+    load_of: NDArray[np.uint8]  # place among the loads, by crayon
+    load_crayon: NDArray[np.uint8]  # ... and back
+    grain: NDArray[np.float64]  # how each of GRAINS grains stands, see `grains`
     hand: NDArray[np.float64]  # the stroke so far
 
 
@@ -79,6 +90,11 @@ def window(cells: int, crayons: int) -> Window:
         weights=floats(1),
         weight=floats(8),
         broken=floats(1),
+        lost=floats(1),
+        lowered=floats(1),
+        load=floats(LOADS),
+        loaded=floats(1),
+        share=floats(1),
         blended=floats(BLEND),
         taken=floats(slots),
         arriving=floats(slots),
@@ -86,7 +102,10 @@ def window(cells: int, crayons: int) -> Window:
         crayon_of=numbers(np.uint8, 256),
         begin=numbers(np.int64, 256),
         end=numbers(np.int64, 256),
-        hand=numbers(np.float64, 10),
+        load_of=numbers(np.uint8, 256, NONE),
+        load_crayon=numbers(np.uint8, LOADS),
+        grain=numbers(np.float64, 4 * GRAINS),
+        hand=numbers(np.float64, 14),
     )
 
 
@@ -139,3 +158,16 @@ def look(w, side, present, top, left, rows, cols, firm, columns):  # type: ignor
                 w.surface[at] = np.float32(1e9)
                 w.over[at] = np.float32(-1e9)
     return np.float32(inside) / np.float32(present)
+
+
+@lean_kernel
+def open_slot(w, cells, slot, wax, begin):  # type: ignore[no-untyped-def]
+    """Give a crayon the next slot, empty."""
+    w.slot_of[wax] = slot
+    w.crayon_of[slot] = wax
+    w.begin[slot] = begin
+    plane = whole(slot * w.film.size)
+    for at in range(cells):
+        w.taken[plane + at] = 0
+    for at in range(cells):
+        w.arriving[plane + at] = 0
