@@ -23,6 +23,7 @@ def test_a_link_in_the_place_of_a_state_file_is_refused(desk: Desk) -> None:
         for kind in ("link", "hard link", "device", "pipe", "folder"):
             victim.write_bytes(b"a photo")
             path = state / name
+            path.unlink(missing_ok=True)  # the lock of the run before
             if kind == "link":
                 path.symlink_to(victim)
             elif kind == "hard link":

@@ -351,17 +351,19 @@ def test_closed_pipe_is_quiet():
 
 SLEEPER = """
 import sys, time
-from crayonize import api, cli
+from crayonize import __main__, api
 def sketch(*_):
     print("ready", flush=True)
     time.sleep(60)
 api.sketch = sketch
-sys.exit(cli.main(sys.argv[1:]))
+sys.exit(__main__.main())
 """
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-@pytest.mark.parametrize("number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    "number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
 def test_signals_end_it_quietly(photo, tmp_path, number, code):
     command = [sys.executable, "-c", SLEEPER, photo, tmp_path / "out.png"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -25,6 +25,7 @@ from PIL import Image
 
 from ..machine import memory
 from ..machine.parent import die_with
+from . import metadata
 from .read import Photo, open_photo, shown
 
 TIME_LIMIT = 300.0  # s without a word
@@ -33,7 +34,7 @@ Message = dict[str, Any]
 
 
 class ReadApart(Photo):
-    """A photo whose light another process has."""
+    """A photo whose light another process has; of its Exif those tags that may go along."""
 
     def __init__(self, path: str | os.PathLike[str], line: _Line, header: Message) -> None:
         self.source, self.name = path, shown(path)
@@ -140,11 +141,9 @@ def _serve(path: str | os.PathLike[str], line: _Line, parent: int) -> NoReturn:
             light = photo.light(wanted["max_side"], tuple(wanted["ground"]))
         os.pwrite(line.shared, light.tobytes(), 0)
         height, width = light.shape[:2]
-        exif = b""
-        with suppress(Exception):  # broken Exif raises nearly anything
-            exif = photo.exif.tobytes() if photo.exif else b""
+        tags = metadata.kept(photo.exif, "all") or metadata.kept(photo.exif, "safe")
         line.say({"height": height, "width": width, "warning": photo.warning,
-                  "exif": base64.b64encode(exif).decode()})  # fmt: skip
+                  "exif": base64.b64encode(tags.tobytes() if tags else b"").decode()})  # fmt: skip
     except MemoryError:
         line.say({"memory": True})
     except Exception as error:  # it is the parent that tells
