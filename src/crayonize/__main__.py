@@ -28,6 +28,8 @@ def main() -> int:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) != signal.SIG_IGN:  # nohup
             signal.signal(number, _end)
+    # none is of use to us, and where threads are few it would give up for want of them
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from .cli import main as run
 
     return run()

@@ -14,6 +14,7 @@ import signal
 import threading
 from typing import IO, Any
 
+from ..machine import cores
 from ..machine.memory import limit_addresses
 from ..machine.parent import die_with
 from .job import Found, Job, Outcome, Recipe
@@ -69,7 +70,10 @@ def main() -> None:
     """Serve the crew at the other end of stdin and stdout."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     line = _Line()
-    hello = line.open()
+    try:
+        hello = line.open()
+    except RuntimeError:
+        return line.say({"broken": f"a worker cannot start: {cores.NO_MORE}"})
     die_with(hello["parent"])
     try:
         from .picture import OutputError, Studio
@@ -79,6 +83,8 @@ def main() -> None:
     except ValueError as error:
         return line.say({"refused": str(error)})
     except Exception as error:  # whatever a broken installation raises
+        if cores.is_out_of_threads(error):
+            return line.say({"broken": f"a worker cannot start: {cores.NO_MORE}"})
         return line.say({"broken": f"a worker cannot start: {type(error).__name__}: {error}"})
     line.say({"ready": os.getpid()})
     while True:

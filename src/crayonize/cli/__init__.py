@@ -17,6 +17,7 @@ from collections.abc import Sequence
 
 from stroke_gen.checks import printable
 
+from ..machine import cores
 from .commands import COMMANDS, convert
 
 
@@ -55,6 +56,8 @@ def _verdict(error: Exception) -> tuple[int, str]:
     if isinstance(error, OSError):
         name = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
         return 1, f"{name}{error.strerror or error}"
+    if cores.is_out_of_threads(error):
+        return 1, cores.NO_MORE
     return 1, f"this should not have happened ({type(error).__name__}: {error}); -v -v shows where"
 
 
