@@ -84,13 +84,15 @@ def _is_left(entry: os.DirEntry[str], owner: int, machine: str) -> bool:
 
 
 def is_alive(pid: int) -> bool:
-    """Whether a process of this machine is there."""
+    """Whether a process of this machine is there, and not one that is dead but still listed."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
     except OSError:  # somebody else's
         return True
+    with suppress(OSError, IndexError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
     return True
 
 

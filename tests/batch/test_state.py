@@ -99,10 +99,11 @@ def test_a_sweep_spares_the_living(tmp_path: Path) -> None:
         assert part.exists()
     finally:
         process.kill()
-        process.wait()
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # dead, and still listed
     assert part.exists()
     sweep(tmp_path)
     assert not list(tmp_path.iterdir())
+    process.wait()
 
 
 def test_a_sweep_tells_machines_apart(tmp_path: Path) -> None:
