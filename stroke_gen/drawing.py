@@ -23,6 +23,7 @@ SIDE_MM = 2.6  # breadth of the strip on which a crayon lying on its side touche
 MAX_FORCE_N = 100.0
 MAX_SHEET_MM = 5000.0
 MAX_TIP_MM = 200.0
+MAX_TILT_DEG = 80.0
 MAX_STROKES = 2_000_000
 MAX_POINTS = 50_000_000
 MAX_SEED = 2**63 - 1
@@ -82,6 +83,8 @@ class Stroke:
     path_mm: (n, 2) float32, x and y.   force_n: (n,) float32, how hard the crayon is pressed at
         each point.
     crayon: its name in the palette.   note: what the stroke is for, one of Note or any word.
+    tilt_deg: (n, 2) float32, how far the crayon's axis leans from upright at each point, and to
+        where on the sheet (0 to the right, 90 down); None: upright.
     """
 
     path_mm: NDArray[np.float32]
@@ -89,6 +92,7 @@ class Stroke:
     crayon: str
     tip: Tip
     note: str = Note.FILL
+    tilt_deg: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +158,13 @@ def _check_stroke(stroke: Stroke, width_mm: float, height_mm: float, where: str)
             path[:, axis], -size, 2 * size, 0.002, f"{where}: path", f"{'xy'[axis]} =", "mm"
         )
     _check_range(force, 0.0, MAX_FORCE_N, 0.0, f"{where}: force", "force =", "N")
+    tilt = stroke.tilt_deg
+    if tilt is None:
+        return
+    if tilt.shape != (len(path), 2):
+        raise ValueError(f"{where}: tilt {tilt.shape} is not of shape ({len(path)}, 2)")
+    _check_range(tilt[:, 0], 0.0, MAX_TILT_DEG, 0.0, f"{where}: tilt", "tilt =", "degrees")
+    _check_range(tilt[:, 1], -360.0, 360.0, 0.0, f"{where}: tilt", "azimuth =", "degrees")
 
 
 def _check_range(

@@ -8,13 +8,14 @@ The file holds one stroke a line:
      "tip": {"kind": "blunt", "width_mm": 2.4}, "force": 1.5,
      "strokes": [
        {"crayon": "red", "path": [[10, 10], [40, 12.5]]},
-       {"crayon": "blue", "path": [[5, 5, 0.8], [9, 5, 2.1]], "tip": {"kind": "sharp"}, "note":
-       "line"}]}
+       {"crayon": "blue", "path": [[5, 5, 0.8], [9, 5, 2.1]], "tip": {"kind": "sharp"},
+        "note": "line", "tilt": [35, 45]}]}
 
 `tip` and `force` at the top are what strokes without their own get. A stroke's force is one number
-or one for each point; a third number in a point is the force there and wins. physics, seed, tip,
-force and note may be left out. Whether paper, palette and crayons exist is for the program that
-draws to say.
+or one for each point; a third number in a point is the force there and wins. `tilt` is how far the
+crayon leans from upright and to where, in degrees (0 to the right, 90 down), once or for each
+point. physics, seed, tip, force, note and tilt may be left out. Whether paper, palette and crayons
+exist is for the program that draws to say.
 """
 
 import contextlib
@@ -61,7 +62,7 @@ _DRAWING_KEYS = (
     "force",
     "strokes",
 )
-_STROKE_KEYS = ("crayon", "path", "force", "tip", "note")
+_STROKE_KEYS = ("crayon", "path", "force", "tip", "note", "tilt")
 _TIP_KEYS = ("kind", "width_mm", "angle_deg")
 _CHUNK = 2**20
 # of a text that may be a drawing: lists (points) and quotation marks to a stroke, and beside them
@@ -201,6 +202,7 @@ def _stroke(data: Any, tip: Tip, force: float, where: str) -> Stroke:
         crayon=data["crayon"],
         tip=_tip(data["tip"], tip, f"{where}: tip") if "tip" in data else tip,
         note=data.get("note", Note.FILL),
+        tilt_deg=_tilt(data["tilt"], len(points), f"{where}: tilt") if "tilt" in data else None,
     )
 
 
@@ -240,6 +242,19 @@ def _forces(value: Any, count: int, where: str) -> NDArray[np.float64]:
         bad = next(v for v in value if not is_number(v))
         raise ValueError(f"{where}: {shown(bad)} is not a finite number")
     return forces
+
+
+def _tilt(value: Any, count: int, where: str) -> NDArray[np.float32]:
+    """Tilt and azimuth (count, 2), from one pair or one for each point."""
+    pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+    for pair in pairs:
+        if not isinstance(pair, list) or len(pair) != 2 or not all(map(is_number, pair)):
+            raise ValueError(f"{where}: {shown(pair)} is not [tilt, azimuth], in degrees")
+    if len(pairs) not in (1, count):
+        raise ValueError(
+            f"{where}: {len(pairs)} pairs for {count} points, give one or one for each point"
+        )
+    return _float32(np.broadcast_to(np.array(pairs, np.float64), (count, 2)))
 
 
 def _float64(values: list[Any]) -> NDArray[np.float64] | None:
@@ -363,6 +378,9 @@ def _labels(stroke: Stroke, usual_tip: Tip) -> dict[str, Any]:
         made["note"] = stroke.note
     if stroke.tip != usual_tip:
         made["tip"] = _tip_object(stroke.tip)
+    if stroke.tilt_deg is not None and stroke.tilt_deg[:, 0].any():
+        tilt = _thousandths(stroke.tilt_deg)
+        made["tilt"] = tilt[0].tolist() if (tilt == tilt[0]).all() else tilt.tolist()
     return made
 
 

@@ -1,18 +1,24 @@
 """Styles: every knob of the generator, with unit, range, effect and starting value.
 
-A style is a TOML file with these keys; the shipped ones lie in stroke_gen/styles. Lengths are in mm
+A style is a TOML file with these keys; the shipped ones lie in stroke_gen/styles, and `extends =
+"artist"` takes from one of them what a file does not say. Lengths are in mm
 on the sheet or in widths of the tip ("tips").
 """
 
 import difflib
 import functools
-import os
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
+from . import checks, files
+from .checks import did_you_mean, of_kind, shown
+
 _FOLDER = Path(__file__).with_name("styles")
+_MAX_BYTES = 1_000_000  # of a style's file
+_MAX_COATS = 64
 
 
 @dataclass(frozen=True)
@@ -97,25 +103,72 @@ def style_names() -> dict[str, str]:
     }
 
 
-def load_style(source: str) -> Style:
-    """A shipped style by name, or a user's TOML file.
+def load_style(source: str | dict[str, Any]) -> Style:
+    """A shipped style by name, a user's TOML file, or the content of one.
 
+    `extends` names a shipped style whose keys hold where no others are given, in a dict also a
+    user's file; `pass` then may be a table of changes by the name of a coat.
     ValueError names the key and the nearest valid one.
+
+    >>> load_style({"extends": "child", "lines": 2.0, "pass": {"fill": {"legs": 5}}}).lines
+    2.0
     """
-    path = _FOLDER / f"{source}.toml" if source in style_names() else Path(source)
-    if path.suffix != ".toml" or not os.path.isfile(path):
+    if isinstance(source, dict):
+        return style_from(_extended(source, "style", _table), "style")
+    table = _table(source)
+    where = source if source in style_names() else str(Path(source))
+    return style_from(_extended(table, where, _shipped), where)
+
+
+def _table(source: str) -> dict[str, Any]:
+    """The keys of a shipped style, or of a user's file and of the style that it extends."""
+    if source in style_names():
+        return _shipped(source)
+    path = Path(source)
+    if path.suffix != ".toml" or not path.is_file():
+        valid = f"{', '.join(style_names())}, or a .toml file"
         near = difflib.get_close_matches(source, style_names(), 1)
-        hint = (
-            f"did you mean {near[0]!r}?"
-            if near
-            else f"valid: {', '.join(style_names())}, or a .toml file"
-        )
+        hint = f"did you mean {near[0]!r}?" if near else f"valid: {valid}"
         raise ValueError(f"style: {source!r} is unknown; {hint}")
     try:
-        table = tomllib.loads(path.read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raw = files.read_bytes(path, _MAX_BYTES, "a style")
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    try:
+        table = tomllib.loads(raw.decode("utf-8-sig"))
+    except RecursionError:
+        raise ValueError(f"{path}: not TOML: nested too deeply") from None
+    except ValueError as error:
         raise ValueError(f"{path}: not TOML: {error}") from None
-    return style_from(table, str(path))
+    return _extended(table, str(path), _shipped)
+
+
+def _shipped(name: str) -> dict[str, Any]:
+    """The keys of a shipped style."""
+    if name not in style_names():
+        near = did_you_mean(name, style_names())
+        raise ValueError(f"extends: {shown(name)} is no shipped style{near}")
+    return tomllib.loads((_FOLDER / f"{name}.toml").read_text("utf-8"))
+
+
+def _extended(
+    table: dict[str, Any], where: str, read: Callable[[str], dict[str, Any]]
+) -> dict[str, Any]:
+    """The table with the keys of the style that it extends, if it does."""
+    if "extends" not in table:
+        return table
+    try:
+        below = read(of_kind(str, table["extends"], "extends", "the name of a style"))
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
+    above = {key: value for key, value in table.items() if key != "extends"}
+    coats, changes = below.get("pass", []), above.get("pass", {})
+    if isinstance(changes, dict):
+        checks.keys(changes, [coat["name"] for coat in coats], f"{where}: pass")
+        for name, change in changes.items():
+            of_kind(dict, change, f"{where}: pass.{name}", "a table of keys")
+        above["pass"] = [coat | changes.get(coat["name"], {}) for coat in coats]
+    return below | above
 
 
 def style_from(table: dict[str, Any], where: str) -> Style:
@@ -124,6 +177,7 @@ def style_from(table: dict[str, Any], where: str) -> Style:
     passes = table.pop("pass", [])
     if not isinstance(passes, list) or not all(isinstance(row, dict) for row in passes):
         raise ValueError(f"{where}: pass: write each coat as a [[pass]] table")
+    checks.count("coats", len(passes), _MAX_COATS, where)
     values = _checked(table, Style, where)
     coats = tuple(
         Pass(**_checked(row, Pass, f"{where}: pass {i + 1}")) for i, row in enumerate(passes)
@@ -187,7 +241,7 @@ def with_age(style: Style, age: int) -> Style:
     """The style as drawn at an age from 3 to 10: the younger, the fatter the crayon, the fewer
     colours, the wider the gaps and the further beyond the border."""
     if not style.lines_first:
-        raise ValueError("age: only a style that draws outlines first, as child does, has an age")
+        raise ValueError("age: only a style that draws outlines first has an age; use style child")
     if not 3 <= age <= 10:
         raise ValueError(f"age: {age} is not between 3 and 10")
     young = (10 - age) / 7

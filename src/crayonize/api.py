@@ -6,6 +6,7 @@ Importing this module is cheap; what is heavy is loaded by the first call.
 from __future__ import annotations
 
 import functools
+import json
 import logging
 import os
 from collections.abc import Callable
@@ -316,7 +317,15 @@ def load_strokes(
         )
     drawing = load_drawing(path)
     _check_no_files(drawing, os.fsdecode(path), palette, paper)
-    return replace(drawing, palette=palette or drawing.palette, paper=paper or drawing.paper)
+    if palette is not None:
+        from .crayons.palette_files import is_file
+        from .crayons.used import with_palette
+
+        if isinstance(drawing.palette, str) and is_file(drawing.palette):  # never opened
+            drawing = replace(drawing, palette=palette)
+        else:
+            drawing = with_palette(drawing, palette)
+    return replace(drawing, paper=paper or drawing.paper)
 
 
 def _check_no_files(drawing: Drawing, where: str, palette: str | None, paper: str | None) -> None:
@@ -404,7 +413,7 @@ def notes(drawing: Drawing, settings: Settings | None = None) -> dict[str, str |
 
     def short(value: Any) -> str | int | float:
         if isinstance(value, dict):
-            return str(value.get("name", "custom"))
+            return json.dumps(value) if "extends" in value else str(value.get("name", "custom"))
         if isinstance(value, str):
             return Path(value).name
         return value if isinstance(value, int | float) else repr(value)

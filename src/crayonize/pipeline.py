@@ -1,7 +1,7 @@
 """The two conductors: a photo becomes a Drawing, a Drawing becomes a picture."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -149,7 +149,8 @@ def sketch(
     who = subject.see(photo, work_shape(width_mm, height_mm))
     # all that is looked at; the large one may go
     photo = fit(photo, work_shape(width_mm, height_mm))
-    style = settings.hand
+    # a pencil's drawing is planned with finer tips than a crayon's
+    style = replace(settings.hand, tip_mm=settings.hand.tip_mm * physics(settings.physics).tip)
     named = settings.paper, told(settings.palette)
     blank = Drawing(width_mm, height_mm, *named, (), settings.physics, settings.seed)
     stand = easel(

@@ -37,7 +37,7 @@ class Settings:
 
     palette: str | dict[str, Any] = "box24"  # a shipped name, a file, colours #rrggbb,..., or JSON
     paper: str | dict[str, Any] = "drawing"  # a shipped name, NAME:#rrggbb, a picture, or JSON
-    style: str = "artist"  # a shipped name or a .toml file
+    style: str | dict[str, Any] = "artist"  # a shipped name, a .toml file, or its content
     force: str | float = "normal"  # light, normal, heavy, or a factor
     size: int = 1600  # long side of the picture in pixels
     sheet_mm: float = 210.0  # long side of the sheet: A5
@@ -93,7 +93,8 @@ class Settings:
 
     def files(self) -> list[Path]:
         """Palette, paper and style, where they are given as files."""
-        given = (self.palette, self.paper, self.style)
+        base = self.style.get("extends") if isinstance(self.style, dict) else self.style
+        given = (self.palette, self.paper, base)
         return [Path(one) for one in given if isinstance(one, str) and Path(one).is_file()]
 
     def plain(self) -> dict[str, Any]:

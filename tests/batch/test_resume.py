@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -120,6 +122,12 @@ def test_a_dry_run_writes_nothing(desk: Desk) -> None:
     desk.fill(3)
     first = desk.run("--dry-run")
     assert first.process.returncode == 0 and first.count("not_run") == 3
+    assert not desk.pictures.exists()
+    listed = subprocess.run(
+        [sys.executable, "-m", "crayonize", desk.photos, desk.pictures, "--dry-run"],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert len(listed.stdout.splitlines()) == 3 and " -> " in listed.stdout
     assert not desk.pictures.exists()
     desk.run()
     assert desk.run("--dry-run").count("skipped") == 3

@@ -2,6 +2,7 @@
 again.
 """
 
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from crayonize import api, cli
+from crayonize.cli import bar
 from crayonize.images.read import read_linear
 from crayonize.images.write import read_settings
 from crayonize.machine import memory
@@ -92,9 +94,9 @@ def test_drawing_says_nothing_on_stdout_and_with_v_seed_and_time_on_stderr(drawn
     folder, out, err = drawn
     assert out == ""
     (line,) = [line for line in err.splitlines() if "compiling" not in line]
-    assert (
-        line.startswith(f"crayonize: {folder / 'one.png'}: 200 x 133 pixels, ") and "seed 5" in line
-    )
+    files = f"{folder / 'one.png'}, {folder / 'strokes.json'}"
+    assert line.startswith(f"crayonize: {files}: 200 x 133 pixels, a sheet of 210 x 140 mm, ")
+    assert "seed 5" in line and " s;" in line
 
 
 def test_picture_has_the_size_and_shows_the_photo(drawn):
@@ -146,7 +148,10 @@ def test_a_photo_taken_away_while_it_is_drawn_costs_no_drawing(photo, run, tmp_p
 
 def test_saved_strokes_give_the_same_picture(drawn, run):
     folder = drawn[0]
-    assert run("draw", folder / "strokes.json", folder / "again.png", "--size", 200) == (0, "", "")
+    again = folder / "again.png"
+    code, out, err = run("draw", folder / "strokes.json", again, "--size", 200)
+    assert (code, out) == (0, "")
+    assert err.startswith(f"crayonize: {again}: 200 x 133 pixels, ") and err.count("\n") == 1
     np.testing.assert_array_equal(
         read_linear(folder / "again.png"), read_linear(folder / "one.png")
     )
@@ -193,6 +198,50 @@ def test_output_beside_the_photo_and_every_other_option(photo, run, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["photo.crayon.png", "photo.jpeg"]
 
 
+def test_the_crayons_of_a_palette(run, tmp_path):
+    code, out, err = run("palettes", "box8")
+    assert (code, err) == (0, "") and out.splitlines()[:2] == [
+        "Box of 8, 8 crayons", "#df2a33  red",
+    ]  # fmt: skip
+    (tmp_path / "mine.txt").write_text("#aa0000 brick\n")
+    assert run("palettes", tmp_path / "mine.txt")[1].splitlines()[1] == "#aa0000  brick"
+
+
+def test_swatches_are_shown_in_a_terminal(run, monkeypatch):
+    monkeypatch.setattr(bar.sys.stdout, "isatty", lambda: True, raising=False)
+    assert "\x1b[48;2;223;42;51m" in run("palettes", "box8")[1]
+
+
+def test_keys_of_a_style_are_set(photo, run, tmp_path):
+    out, words = tmp_path / "out.png", ["--size", 60, "--set", "lines=0.0", "--set", "fill.legs=3"]
+    assert run(photo, out, *words)[0] == 0
+    style = json.loads(read_settings(out)["style"])
+    assert style == {"extends": "artist", "lines": 0.0, "pass": {"fill": {"legs": 3}}}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes streams in a shell")
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-"])
+def test_closed_streams_cost_no_drawing(photo, tmp_path, closed):
+    out = tmp_path / "out.png"
+    line = f'exec "{sys.executable}" -m crayonize "{photo}" "{out}" --size 60 {closed}'
+    assert subprocess.run(["sh", "-c", line], capture_output=True).returncode == 0
+    assert read_linear(out).shape == (40, 60, 3)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes streams in a shell")
+def test_a_closed_stream_is_no_file_of_ours(tmp_path):
+    code = "import os; from crayonize.cli import main; main(['styles']); os.write(2, b'lost')"
+    line = f'exec "{sys.executable}" -c "{code}; print(open(1).name)" 2>&- >&-'
+    assert subprocess.run(["sh", "-c", line], cwd=tmp_path).returncode == 0
+
+
+def test_a_name_that_begins_with_a_dash(photo, run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "-dash.jpg").write_bytes(photo.read_bytes())
+    assert run("--size", 60, "--", "-dash.jpg", "out.png")[0] == 0
+    assert (tmp_path / "out.png").exists()
+
+
 # ---- bad ones: exit code, and words of the one line ----------------------------------------------
 
 PHOTO, OUT, TEXT, FOLDER = "{photo}", "{tmp}/out.png", "{tmp}/text.jpg", "{tmp}"
@@ -224,6 +273,19 @@ BAD = [
     (2, [PHOTO, OUT, "--palete", "box8"], "--palete", 'did you mean "--palette"'),
     (2, [PHOTO, OUT, "--palet=box8"], "--palet", 'did you mean "--palette"'),
     (2, [PHOTO, OUT, "-z"], "-z"),
+    (2, ["palete"], "palete", 'did you mean the command "palettes"'),
+    (2, ["nothing", OUT], "nothing", "no file"),
+    (2, ["{tmp}/house.json", OUT], "crayonize draw {tmp}/house.json"),
+    (2, [PHOTO, OUT, "--age", "5"], "age", "style child"),
+    (2, [PHOTO, OUT, "--seconds", "5"], "--seconds changes nothing without --timelapse"),
+    (2, [PHOTO, OUT, "--show-tip"], "--show-tip changes nothing without --timelapse"),
+    (2, [PHOTO, OUT, "--size=90", "--print", "a4"], "--size changes nothing: --print"),
+    (2, [PHOTO, OUT, "--size=90", "--dpi", "100"], "--size changes nothing: --dpi"),
+    (2, [PHOTO, OUT, "--sheet", "a4", "--print", "a4"], "--sheet changes nothing: --print"),
+    (2, [PHOTO, OUT, "--set", "linse=2"], "linse", "lines"),
+    (2, [PHOTO, OUT, "--set", "fil.legs=2"], "fil", "fill"),
+    (2, [PHOTO, OUT, "--set", "lines"], "KEY=VALUE"),
+    (2, [PHOTO, OUT, "--set", "lines=many"], "lines", "many"),
     (2, [PHOTO, OUT, "-q", "-v"], "not allowed"),
     (2, [PHOTO, OUT, "--palette", "box25"], "box25", "box24"),
     (2, [PHOTO, OUT, "--palette", TEXT], "text.jpg"),
@@ -246,10 +308,12 @@ BAD = [
     (2, [PHOTO, OUT, "--strokes", "{tmp}/missing/s.json"], "missing", "folder"),
     (2, ["draw"], "DRAWING"),
     (2, ["draw", "{tmp}/missing.json", OUT], "missing.json"),
-    (2, ["draw", TEXT, OUT], "text.jpg", "JSON"),
+    (2, ["draw", PHOTO, OUT], "no drawing", "crayonize {photo} {tmp}/out.png"),
+    (2, ["draw", "{tmp}/text.txt", OUT], "text.txt", "JSON"),
+    (2, ["steps", PHOTO, "{tmp}/out.pdf"], "no drawing", "crayonize {photo}"),
     (2, ["draw", "{tmp}/png.png", "{tmp}/png.png"], "png.png", "over"),
     (2, ["draw", TEXT, OUT, "--sise", "3"], "--sise", "--size"),
-    (2, ["palettes", "x"], "x"),
+    (2, ["palettes", "box25"], "box25", "box24"),
     (2, ["warmup", "--fast"], "--fast"),
     (2, ["bench", "--quik"], "--quik", 'did you mean "--quick"'),
     (2, ["bench", "x"], "x is one too many"),
@@ -263,6 +327,7 @@ BAD = [
 def desk(tmp_path, photo):
     """A folder with things to stumble over."""
     (tmp_path / "text.jpg").write_text("no picture, no palette, no drawing\n")
+    (tmp_path / "text.txt").write_text("no drawing\n")
     (tmp_path / "png.png").write_text("{}")
     (tmp_path / "folder.png").mkdir()
     (tmp_path / "link.png").symlink_to(photo)
@@ -279,7 +344,7 @@ def test_bad_command_line_is_one_clear_line_and_changes_nothing(bad, desk, photo
     assert got == code and out == ""
     assert err.startswith("crayonize: ") and err.count("\n") == 1 and err.endswith("\n")
     for word in wanted:
-        assert word in err
+        assert word.format(photo=photo, tmp=desk) in err
     assert {path: path.read_bytes() for path in desk.iterdir() if path.is_file()} == before
 
 
@@ -352,6 +417,7 @@ def test_closed_pipe_is_quiet():
 SLEEPER = """
 import sys, time
 from crayonize import __main__, api
+from crayonize.cli import bar
 def sketch(*_):
     print("ready", flush=True)
     time.sleep(60)

@@ -8,12 +8,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from crayonize.crayons.palette import Crayon, Palette
 from crayonize.crayons.palette_files import MAX_CRAYONS, load_palette, palette_names
 from crayonize.crayons.pigment import default_hiding
+from crayonize.crayons.used import with_palette
+from crayonize.images.srgb import luminance
 from stroke_gen.checks import did_you_mean, quoted
+from stroke_gen.drawing import Drawing, Stroke, Tip
 
 DATA = Path(load_palette.__code__.co_filename).parents[1] / "data" / "palettes"
 NAMES = [name for name, _, _ in palette_names()]
@@ -357,11 +361,9 @@ BAD_FILES = [
         'a.gpl: line 3: "1 2 300 b" does not begin with three numbers',
     ),
     ("a.gpl", GIMP + "1 2\n", "a.gpl: line 2"),
-    ("a.gpl", GIMP + "1 2 3 a\n\n4 5 6 A\n", 'a.gpl: line 4: a second crayon "a"'),
-    ("a.gpl", b"GIMP Palette\n1 2 3 gr\xfcn\n", "a.gpl: line 2: not UTF-8"),
+    ("a.json", b'{"name": "gr\xfcn"}', "a.json: line 1: not UTF-8"),
     ("a.txt", "#ff0000\n#ff00\n", 'a.txt: line 2: "#ff00" is not #rrggbb'),
     ("a.hex", "ff0000\nred\n", 'a.hex: line 2: "red" is not #rrggbb'),
-    ("a.hex", "ff0000\n" * 2, 'a.hex: line 2: a second crayon "#ff0000"'),
     ("a.txt", "".join(f"{i:06x}\n" for i in range(255)), "a.txt: 255 crayons"),
     ("a.png", "x", "a.png: a palette file ends in .json, .gpl, .txt or .hex"),
 ]
@@ -391,8 +393,7 @@ def test_bad_file_gets_one_clear_line(
         ("a\0b.json", "a\\x00b.json: cannot be read"),
         ("#ff0000,blue", 'palette list: item 2: "blue" is not #rrggbb'),
         ("#ff0000,", 'palette list: item 2: "" is not #rrggbb'),
-        ("#ff0000,#ff0000", 'palette list: item 2: a second crayon "#ff0000"'),
-        (",".join(["#ff0000"] * 300), "palette list: 300 crayons"),
+        (",".join(f"#{i:06x}" for i in range(300)), "palette list: 300 crayons"),
         ({"crayons": {}}, "palette: crayons: an object is not a list"),
         (7, "palette: 7 is not a name, a file, a list of colours or an object"),
     ],
@@ -401,6 +402,44 @@ def test_bad_source_gets_one_clear_line(source: object, part: str) -> None:
     with pytest.raises(ValueError) as caught:
         load_palette(source)  # type: ignore[arg-type]
     assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "crayons"),
+    [
+        ("twice.gpl", GIMP + "255 0 0\tTile\n0 0 255\tTile\n255 0 0 again\n",
+         [("tile", "#ff0000"), ("tile 2", "#0000ff")]),
+        ("aseprite.gpl", "GIMP Palette\nChannels: RGBA\n#\n254  91  89 255 Red\n 57 120 168 255\n",
+         [("red", "#fe5b59"), ("#3978a8", "#3978a8")]),
+        ("old.gpl", b"GIMP Palette\nName: x\nColumns: 2\n1 2 3 gr\xfcn\n", [("grün", "#010203")]),
+        ("paint.txt", ";paint.net Palette File\n;Colors: 2\nFF1a1c2c\nffB13E53\n",
+         [("#1a1c2c", "#1a1c2c"), ("#b13e53", "#b13e53")]),
+        ("line.txt", "#cc2222 #224488 sea #88aa44\n",
+         [("#cc2222", "#cc2222"), ("sea", "#224488"), ("#88aa44", "#88aa44")]),
+        ("again.hex", "ff0000\n" * 2, [("#ff0000", "#ff0000")]),
+    ],
+)  # fmt: skip
+def test_public_palettes_are_read(
+    tmp_path: Path, name: str, content: str | bytes, crayons: list[tuple[str, str]]
+) -> None:
+    palette = load_palette(write(tmp_path, name, content))
+    assert [(crayon.name, crayon.hex) for crayon in palette.crayons] == crayons
+
+
+def test_a_list_needs_no_commas() -> None:
+    names = [crayon.hex for crayon in load_palette("#cc2222 #224488 sea,#88aa44").crayons]
+    assert names == ["#cc2222", "#224488", "#88aa44"]
+
+
+def test_a_drawing_in_the_crayons_of_another_box() -> None:
+    path, force = np.zeros((1, 2), np.float32), np.ones(1, np.float32)
+    strokes = tuple(Stroke(path, force, name, Tip()) for name in ("yellow", "black", "red"))
+    grey = with_palette(Drawing(100.0, 100.0, "drawing", "box8", strokes), "greys")
+    box = {crayon.name: luminance(crayon.hex) for crayon in load_palette("greys").crayons}
+    light = [box[s.crayon] for s in grey.strokes]
+    assert grey.palette == "greys" and light[0] > light[2] > light[1]
+    same = with_palette(Drawing(100.0, 100.0, "drawing", "box8", strokes), "box24")
+    assert [s.crayon for s in same.strokes] == ["yellow", "black", "red"]
 
 
 def test_pipe_is_refused_at_once(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from stroke_gen.drawing import Drawing, Stroke, Tip
 from stroke_gen.drawing_file import drawing_from_json, drawing_to_json, load_drawing, save_drawing
@@ -38,6 +39,12 @@ def drawing(*strokes: Stroke, **changes: Any) -> Drawing:
     return Drawing(**{**fields, "strokes": strokes, **changes})
 
 
+def tilt_of(stroke: Stroke) -> NDArray[np.float32]:
+    """Its tilt; upright is 0."""
+    upright = np.zeros((len(stroke.path_mm), 2), np.float32)
+    return upright if stroke.tilt_deg is None else stroke.tilt_deg
+
+
 def equal(one: Drawing, two: Drawing) -> bool:
     def fields(d: Drawing) -> tuple[Any, ...]:
         return d.width_mm, d.height_mm, d.paper, d.palette, d.physics, d.seed, len(d.strokes)
@@ -46,6 +53,7 @@ def equal(one: Drawing, two: Drawing) -> bool:
         (a.crayon, a.tip, a.note) == (b.crayon, b.tip, b.note)
         and np.allclose(a.path_mm, b.path_mm, rtol=0, atol=0.00052)
         and np.allclose(a.force_n, b.force_n, rtol=0, atol=0.00051)
+        and np.allclose(tilt_of(a), tilt_of(b), rtol=0, atol=0.00051)
         and a.path_mm.shape == b.path_mm.shape
         for a, b in zip(one.strokes, two.strokes, strict=True)
     )
@@ -58,6 +66,9 @@ VARIED = drawing(
     stroke(3, 4, crayon="gr\u00fcn", tip=Tip("sharp", 1.25)),
     stroke(2, 5, path_mm=np.array([[-297, -210], [594, 420]], np.float32)),
     stroke(2, 6, path_mm=np.array([[-0.0001, 12], [0, 12.3456]], np.float32)),
+    stroke(3, 7, tilt_deg=np.tile(np.float32([35.5, -45]), (3, 1))),
+    stroke(2, 8, tilt_deg=np.array([[0, 90], [80, 360]], np.float32)),
+    stroke(2, 9, tilt_deg=np.zeros((2, 2), np.float32)),
     paper={"tooth_um": 40, "name": "rough"},
     physics="grey levels",
     seed=2**63 - 1,
@@ -193,6 +204,24 @@ def test_force_in_a_point_wins(as_text: bool) -> None:
     assert all(s.path_mm.tolist() == [[1, 2], [3, 4], [5, 6]] for s in one.strokes)
 
 
+@pytest.mark.parametrize("as_text", [False, True])
+def test_tilt_is_given_once_or_for_each_point(as_text: bool) -> None:
+    path = [[1, 2], [3, 4]]
+    given = by_hand(
+        {"crayon": "red", "path": path, "tilt": [35, 45]},
+        {"crayon": "red", "path": path, "tilt": [[0, 0], [40, -90]]},
+        {"crayon": "red", "path": path},
+    )
+    one = load_drawing(io.StringIO(json.dumps(given))) if as_text else drawing_from_json(given)
+    assert [tilt_of(s).tolist() for s in one.strokes] == [
+        [[35, 45], [35, 45]],
+        [[0, 0], [40, -90]],
+        [[0, 0], [0, 0]],
+    ]
+    lines = json.dumps(drawing_to_json(one))
+    assert lines.count('"tilt": ') == 2 and '"tilt": [35.0, 45.0]' in lines  # upright is not said
+
+
 # ---- what is wrong, and what would be right ------------------------------------------------------
 
 
@@ -270,6 +299,12 @@ MALFORMED: list[tuple[Any, str]] = [
     (bad(force=[1]), "stroke 2 (red): force: 1 numbers for 2 points"),
     (bad(force=[1, "2"]), 'stroke 2 (red): force: "2" is not a finite number'),
     (bad(force=[1, NAN]), "stroke 2 (red): force: nan is not a finite number"),
+    (bad(tilt=35), "stroke 2 (red): tilt: 35 is not [tilt, azimuth], in degrees"),
+    (bad(tilt=[35]), "stroke 2 (red): tilt: a list of 1 is not [tilt, azimuth], in degrees"),
+    (bad(tilt=[35, NAN]), "stroke 2 (red): tilt: a list of 2 is not [tilt, azimuth], in degrees"),
+    (bad(tilt=[[1, 2]] * 3), "stroke 2 (red): tilt: 3 pairs for 2 points, give one or one for"),
+    (bad(tilt=[81, 0]), "stroke 2 (red): tilt: point 1: tilt = 81 is not from 0 to 80 degrees"),
+    (bad(tilt=[9, 361]), "tilt: point 1: azimuth = 361 is not from -360 to 360 degrees"),
     (
         bad(tip="blunt"),
         'stroke 2 (red): tip: "blunt" is not an object with kind, width_mm, angle_deg',

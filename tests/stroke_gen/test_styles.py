@@ -159,6 +159,39 @@ def test_what_is_wrong_is_named_in_one_line(tmp_path, text, named):
     assert all(word in line for word in named), line
 
 
+def test_a_style_extends_another(tmp_path):
+    text = 'extends = "child"\nlines = 2\n[pass.fill]\nlegs = 5\n'
+    mine, child = user_style(tmp_path, text), load_style("child")
+    coats = tuple(replace(c, legs=5) if c.name == "fill" else c for c in child.passes)
+    assert mine == replace(child, lines=2, passes=coats) and mine.passes != child.passes
+    above = {"extends": str(tmp_path / "mine.toml"), "lines": 0.5}
+    assert load_style(above) == replace(mine, lines=0.5)
+    own = user_style(tmp_path, 'extends = "child"\n[[pass]]\nname = "mine"\n')
+    assert own == replace(child, passes=(Pass(name="mine"),))
+
+
+@pytest.mark.parametrize("text, words", [
+    ('extends = "chidl"', 'extends: "chidl" is no shipped style (did you mean "child"?)'),
+    ("extends = 3", "extends: 3 is not the name of a style"),
+    ('extends = "other.toml"', "no shipped style"),
+    ('extends = "child"\npass.fil.legs = 3', 'unknown key "fil" (did you mean "fill"?)'),
+    ('extends = "child"\npass.fill = 3', "pass.fill: 3 is not a table of keys"),
+    ("a=" + "[" * 3000, "nested too deeply"),
+    ("lines = 1" + "0" * 5000, "not TOML"),
+    ("[[pass]]\n" * 65, "65 coats, at most 64"),
+    ("# " + "x" * 1_000_000, "larger than 1 MB"),
+])  # fmt: skip
+def test_a_style_that_extends_wrongly_or_hurts(tmp_path, text, words):
+    with pytest.raises(ValueError, match=re.escape(words)) as error:
+        user_style(tmp_path, text)
+    assert "mine.toml" in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_byte_order_mark_is_no_key(tmp_path):
+    (tmp_path / "mine.toml").write_bytes(b"\xef\xbb\xbflines = 2.0\n")
+    assert load_style(str(tmp_path / "mine.toml")).lines == 2
+
+
 def test_a_file_that_is_no_text(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(b"\xff\xfe\x00title")

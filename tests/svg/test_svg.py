@@ -14,7 +14,7 @@ from crayonize.crayons.used import by_crayon
 from crayonize.images.srgb import luminance
 from crayonize.svg import path as svg_path
 from crayonize.svg.load import load_svg
-from crayonize.svg.save import save_svg
+from crayonize.svg.save import FORCE_TOLERANCE, TOLERANCE_MM, save_svg, simplified
 from crayonize.svg.shapes import transform
 from stroke_gen.drawing import Drawing, Stroke, Tip
 
@@ -94,6 +94,41 @@ def test_file_appears_whole_or_not_at_all(drawing, tmp_path):
     with pytest.raises(ValueError, match="does not exist"):
         save_svg(drawing, tmp_path / "missing" / "d.svg")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_points_are_left_out_within_the_tolerances():
+    """A winding path as densely sampled as the generator's: a tenth of it, and nowhere far off."""
+    t = np.linspace(0, 6, 2000)
+    path = np.stack([20 + 3 * t, 30 + 4 * np.sin(t)], 1).astype(np.float32)
+    force = (1 + 0.5 * np.sin(2 * t)).astype(np.float32)
+    kept = simplified(path, force)
+    assert kept[0] and kept[-1] and kept.sum() < 200
+    for before, after, tolerance in (
+        (path[:, 0], path[kept, 0], TOLERANCE_MM), (path[:, 1], path[kept, 1], TOLERANCE_MM),
+        (force, force[kept], FORCE_TOLERANCE * 1.5),
+    ):  # fmt: skip
+        assert np.abs(np.interp(t, t[kept], after) - before).max() < 2 * tolerance
+    line = np.stack([t, 2 * t], 1).astype(np.float32)
+    assert simplified(line, 1 + t.astype(np.float32)).sum() == 2
+    assert simplified(line[:1], force[:1]).sum() == 1
+    spike = np.where(np.arange(2000) == 700, np.float32(2), np.float32(1))
+    assert set(np.flatnonzero(simplified(line, spike))) == {0, 699, 700, 701, 1999}
+
+
+def test_a_whole_drawing_of_the_generator_comes_in_again(tmp_path):
+    """As many points as a photo's drawing has: a few MB, and no limit of our own is in its way."""
+    rng = np.random.default_rng(0)
+    strokes = []
+    for _ in range(5000):
+        t = np.linspace(0, 8, 80)
+        swing = np.cumsum(rng.normal(0, 0.02, 80))
+        path = rng.uniform(10, 190, 2) + np.stack([t, np.cumsum(swing) * 0.1], 1)
+        force = 1 + np.cumsum(rng.normal(0, 0.02, 80))
+        strokes.append(stroke(path, np.clip(force, 0.1, 3), "red", Tip("blunt", 1.6)))
+    drawing = Drawing(210.0, 210.0, "drawing", "box8", tuple(strokes))
+    save_svg(drawing, tmp_path / "d.svg")
+    assert (tmp_path / "d.svg").stat().st_size < 4_000_000
+    assert len(load_svg(tmp_path / "d.svg", palette="box8").strokes) == 5000
 
 
 def test_what_goes_out_comes_in_again(drawing, saved):

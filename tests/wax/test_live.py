@@ -1,5 +1,7 @@
 """Drawing by hand gives the wax of whole strokes, and tells what it changes."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -72,6 +74,23 @@ def test_segments_joined_are_the_strokes_of_rub(way, physics, monkeypatch):
         draw(live, way(rng), CRAYONS[number % 3], TIPS[number % 4])
     assert len(live.easel.box.masks) > 1 + len(TIPS)  # the tips have worn
     assert wax(live.easel) == wax(pipeline.draw(live.drawing(), SIZE))
+
+
+def test_a_tilted_crayon_draws_the_same_by_hand_and_from_its_strokes(live, tmp_path):
+    rng = np.random.default_rng(8)
+    for crayon in CRAYONS:
+        points = np.column_stack([straight(rng), rng.uniform((0, -90), (60, 90), (6, 2))])
+        points[2:4, 3] = 0  # upright on the way
+        live.press(*points[0, :3], crayon, TIPS[0], "line", *points[0, 3:])
+        for point in points[1:]:
+            live.move(*point)
+        live.lift()
+    assert wax(live.easel) == wax(pipeline.draw(live.drawing(), SIZE))
+    save_drawing(live.drawing(), tmp_path / "d.json")
+    again = load_drawing(tmp_path / "d.json")
+    assert wax(live.easel) == wax(pipeline.draw(again, SIZE))
+    upright = replace(again, strokes=tuple(replace(s, tilt_deg=None) for s in again.strokes))
+    assert wax(live.easel) != wax(pipeline.draw(upright, SIZE))
 
 
 def test_saved_and_drawn_again_it_is_the_same(live, tmp_path):

@@ -900,3 +900,42 @@ def test_pigment_colours_the_wax_of_the_same_palette(bench):
     more_k, more_s = Box(bench.palette, replace(bench.physics, pigment=3.0), 0.1).optics()
     np.testing.assert_allclose(more_k, 3 * k)
     np.testing.assert_allclose(more_s, 3 * s)
+
+
+# ---- tilt ----------------------------------------------------------------------------------------
+
+
+def tilted(bench, tilt_deg, azimuth_deg, tip=None):
+    """The film of a short stroke to the right on flat paper, drawn with a tilted crayon."""
+    sheet = bench.sheet(np.zeros((40, 120)))
+    line = bench.stroke([[1, 2], [6, 2], [11, 2]], 6.0, tip=tip)
+    lean = np.tile(np.float32([tilt_deg, azimuth_deg]), (3, 1))
+    bench.changed(slip=0.0).draw(sheet, [replace(line, tilt_deg=lean)])
+    return sheet.film_um().astype(float)
+
+
+def across(film):
+    """How far from the middle of its way the wax of a stroke lies, in cells downwards."""
+    return (film.sum(1) * (np.arange(40) + 0.5 - 20)).sum() / film.sum()
+
+
+def test_an_upright_crayon_draws_as_one_without_a_tilt(bench):
+    sheet = bench.sheet(np.zeros((40, 120)))
+    line = bench.stroke([[1, 2], [6, 2], [11, 2]], 6.0)
+    bench.changed(slip=0.0).draw(sheet, [line])
+    np.testing.assert_array_equal(sheet.film_um(), tilted(bench, 0, 77).astype(np.float32))
+
+
+def test_a_tilted_crayon_gives_more_on_the_side_to_which_it_leans(bench):
+    up, down = (across(tilted(bench, 40, azimuth)) for azimuth in (-90, 90))
+    more = across(tilted(bench, 70, 90))
+    level = across(tilted(bench, 0, 0))
+    assert up < level - 0.3 and down > level + 0.3 and more > down + 0.3
+    assert abs(across(tilted(bench, 40, 0)) - level) < 0.3  # along the way it is no side's
+
+
+def test_a_tilted_tip_is_worn_flat_on_its_way(bench):
+    """What was an edge becomes a face: the stroke broadens."""
+    film = tilted(bench.changed(wear=0.5), 60, 90, Tip("blunt", 2.0))
+    breadth = (film > 0.3 * film.max()).sum(0)
+    assert breadth[80:105].mean() > breadth[12:25].mean() + 2

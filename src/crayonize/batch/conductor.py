@@ -3,7 +3,7 @@
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path, PurePath
 from types import FrameType
 from typing import Any
@@ -83,7 +83,9 @@ def run(
 
 def _fields(recipe: Recipe) -> dict[str, str]:
     """What a template for names may tell of the settings."""
-    settings = asdict(recipe.settings)
+    settings = recipe.settings.plain()
+    if isinstance(settings["style"], dict):
+        settings["style"] = settings["style"].get("extends", "custom")
     return {
         field: Path(str(settings[field])).stem for field in ("palette", "paper", "style", "seed")
     }
@@ -105,7 +107,7 @@ def _tell(plan: Plan, to_do: Sequence[Job], report: Report) -> int:
     report.others(plan.others)
     for job in to_do:
         report.file(job.photo.name, Outcome("not_run"), job.out)
-        report.say(f"{job.photo.name} -> {job.target}", always=False)
+        report.listed(f"{job.photo.name} -> {job.target}")
     report.end(0, elsewhere=plan.elsewhere)
     return 0
 

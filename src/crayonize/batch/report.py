@@ -100,6 +100,11 @@ class Report:
             self._pace.bar.clear()
             tell(f"crayonize: {printable(' '.join(text.split()))}\n")
 
+    def listed(self, text: str) -> None:
+        """A line of a list on stdout, for people; programs have their JSON there."""
+        if not self._json:
+            _print(printable(text))
+
     def end(self, code: int, reason: str = "", elsewhere: int = 0) -> None:
         """The account of all files. reason: why the run was stopped, if it was."""
         seconds = time.monotonic() - self._begun

@@ -18,12 +18,14 @@ from collections.abc import Sequence
 from stroke_gen.checks import printable
 
 from ..machine import cores
+from ..machine.terminal import tell
 from .commands import COMMANDS, convert
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     words = list(sys.argv[1:] if words is None else words)
+    _fill_streams()
     # what is left at the end goes as a whole; to look through it first takes 0.2 s
     atexit.register(gc.freeze)
     for stream in (sys.stdout, sys.stderr):
@@ -32,7 +34,8 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         command = COMMANDS.get(words[0]) if words else None
         code = command(words[1:]) if command else convert(words)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
         return code
     except KeyboardInterrupt:
         return 130
@@ -43,8 +46,20 @@ def main(words: Sequence[str] | None = None) -> int:
         if words.count("-v") + 2 * words.count("-vv") > 1:
             raise
         code, line = _verdict(error)
-        print(f"crayonize: {_one_line(line)}", file=sys.stderr)
+        tell(f"crayonize: {_one_line(line)}\n")
         return code
+
+
+def _fill_streams() -> None:
+    """Open nothing in the place of stdin, stdout or stderr that are closed.
+
+    The next file to be opened, the picture, would else be what libraries take for stderr.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
 
 
 def _verdict(error: Exception) -> tuple[int, str]:

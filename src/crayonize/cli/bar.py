@@ -4,16 +4,18 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stroke_gen.checks import printable
 
-from ..machine.terminal import Bar
+from ..machine.terminal import Bar, tell
 
 if TYPE_CHECKING:
+    from stroke_gen.drawing import Drawing
+
     from ..pipeline import Easel, Progress
 
 
@@ -35,7 +37,7 @@ def talk(options: argparse.Namespace) -> Iterator["Progress"]:
         class Messages(logging.Handler):
             def emit(self, record: logging.LogRecord) -> None:
                 bar.clear()
-                print(f"crayonize: {record.getMessage()}", file=sys.stderr, flush=True)
+                tell(f"crayonize: {record.getMessage()}\n")
 
         log, messages = logging.getLogger("crayonize"), Messages()
         if not options.verbose:
@@ -50,8 +52,22 @@ def talk(options: argparse.Namespace) -> Iterator["Progress"]:
             log.removeHandler(messages)
 
 
-def report(out: str | Path, easel: "Easel", strokes: int, seed: int, begun: float) -> None:
-    """What was done, for -v and where the name of the output was ours to choose."""
-    size = f"{easel.sheet.cols} x {easel.sheet.rows} pixels"
-    figures = f"{size}, {strokes} strokes, seed {seed}, {time.monotonic() - begun:.1f} s"
-    print(f"crayonize: {printable(os.fspath(out))}: {figures}", file=sys.stderr)
+def swatch(colour: str) -> str:
+    """Some blanks on a ground of #rrggbb if stdout is a terminal; else nothing."""
+    if sys.stdout is None or not sys.stdout.isatty():
+        return ""
+    red, green, blue = bytes.fromhex(colour[1:])
+    return f"\x1b[48;2;{red};{green};{blue}m    \x1b[0m "
+
+
+def report(
+    out: str | Path, beside: Sequence[str | None], easel: "Easel", drawing: "Drawing", begun: float,
+    *, verbose: bool,
+) -> None:  # fmt: skip
+    """One line on stderr: what was written, how large it is, and how long it took."""
+    files = ", ".join(printable(os.fspath(name)) for name in (out, *beside) if name)
+    pixels = f"{easel.sheet.cols} x {easel.sheet.rows} pixels"
+    sheet = f"a sheet of {drawing.width_mm:.0f} x {drawing.height_mm:.0f} mm"
+    more = f"; {len(drawing.strokes)} strokes, seed {drawing.seed}" if verbose else ""
+    seconds = time.monotonic() - begun
+    tell(f"crayonize: {files}: {pixels}, {sheet}, {seconds:.1f} s{more}\n")

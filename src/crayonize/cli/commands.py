@@ -1,19 +1,24 @@
 """What each command does: its words read, the work handed to the rooms that do it."""
 
 import argparse
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import fields
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..images import metadata, page
+from ..machine.terminal import tell
 from ..settings import Settings
 from . import folders
-from .bar import report, talk
+from .bar import report, swatch, talk
 from .options import Parser, add_strokes, add_talk, drawing_parser, photo_parser
+
+PHOTO_SUFFIXES = (
+    ".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".avif", ".heic", ".heif", ".gif", ".bmp",
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from stroke_gen.drawing import Drawing
@@ -30,7 +35,8 @@ def convert(words: Sequence[str]) -> int:
     paths = [path for path in (options.photo, options.out, *options.more) if path is not None]
     several = folders.inputs_and_output(paths, options.output)
     chosen = {f.name: getattr(options, f.name) for f in fields(Settings) if f.name in options}
-    settings = api.settings_of(chosen | {"focus": tuple(options.focus)})
+    chosen |= {"focus": tuple(options.focus), "style": _style(options)}
+    settings = api.settings_of(chosen)
     if several:
         if options.timelapse or options.legend:
             raise ValueError("--timelapse and --legend are for one photo")
@@ -39,6 +45,7 @@ def convert(words: Sequence[str]) -> int:
         return run(*several, folders.options_of(options), folders.recipe_of(options, settings))
 
     photo = Path(options.photo)
+    _check_photo(photo)
     out = options.out or options.output or photo.with_name(f"{photo.stem}.crayon.png")
     folders.check_alone(options)
     api.check_outputs([photo, *settings.files()], out, options.strokes, options.timelapse)
@@ -63,9 +70,38 @@ def convert(words: Sequence[str]) -> int:
             kept=kept,
             legend=options.legend,
         )
-    if options.verbose or (options.out is None and not options.quiet):
-        report(out, easel, len(drawing.strokes), drawing.seed, begun)
+    if not options.quiet:
+        beside = (options.strokes, options.timelapse)
+        report(out, beside, easel, drawing, begun, verbose=options.verbose > 0)
     return 0
+
+
+def _style(options: argparse.Namespace) -> str | dict[str, Any]:
+    """The style that the command line names, with the keys that it sets."""
+    if not options.knobs:
+        return str(options.style)
+    style: dict[str, Any] = {"extends": options.style}
+    for key, value in options.knobs:
+        coat, dot, own = key.rpartition(".")
+        keys = style.setdefault("pass", {}).setdefault(coat, {}) if dot else style
+        keys[own] = value
+    return style
+
+
+def _check_photo(photo: Path) -> None:
+    """ValueError with what was probably meant if a photo is none."""
+    if photo.suffix.lower() in (".json", ".svg"):
+        raise ValueError(f"{photo}: is no photo; to draw its strokes: crayonize draw {photo} OUT")
+    if not photo.suffix and not photo.exists():
+        near = get_close_matches(str(photo), COMMANDS, 1)
+        meant = f'; did you mean the command "{near[0]}"?' if near else ", and no command"
+        raise ValueError(f"{photo}: is no file{meant}")
+
+
+def _check_drawing(path: str, out: str) -> None:
+    """ValueError with what was probably meant if a drawing is a photo."""
+    if Path(path).suffix.lower() in PHOTO_SUFFIXES:
+        raise ValueError(f"{path}: is no drawing; to draw a photo: crayonize {path} {out}")
 
 
 def _spare_photo(out: str) -> None:
@@ -87,6 +123,7 @@ def _draw(words: Sequence[str]) -> int:
     from .. import api
 
     api.check_outputs([options.drawing], options.out, options.strokes, options.timelapse)
+    _check_drawing(options.drawing, options.out)
     with talk(options) as progress:
         given = _strokes(options)
         with api.filming(
@@ -98,8 +135,9 @@ def _draw(words: Sequence[str]) -> int:
         api.finish(
             drawing, easel, options.out, options.strokes, light=options.light, legend=options.legend
         )
-    if options.verbose:
-        report(options.out, easel, len(drawing.strokes), drawing.seed, begun)
+    if not options.quiet:
+        beside = (options.strokes, options.timelapse)
+        report(options.out, beside, easel, drawing, begun, verbose=options.verbose > 0)
     return 0
 
 
@@ -119,6 +157,7 @@ def _steps(words: Sequence[str]) -> int:
 
     from .. import api
 
+    _check_drawing(options.drawing, "OUT")
     with talk(options) as progress:
         api.save_steps(_strokes(options), options.out, progress)
     return 0
@@ -154,7 +193,7 @@ def _warmup(words: Sequence[str]) -> int:
     with talk(options):
         api.warm_up()
     if not options.quiet:
-        print(f"crayonize: ready after {time.monotonic() - begun:.1f} s", file=sys.stderr)
+        tell(f"crayonize: ready after {time.monotonic() - begun:.1f} s\n")
     return 0
 
 
@@ -193,13 +232,19 @@ def _bench(words: Sequence[str]) -> int:
 
 
 def _palettes(words: Sequence[str]) -> int:
-    """crayonize palettes: list the boxes of crayons."""
-    Parser(prog="crayonize palettes", description="List the boxes of crayons, for --palette.").read(
-        words
-    )
-    from ..crayons.palette_files import palette_names
+    """crayonize palettes [NAME]: list the boxes of crayons, or the crayons of one."""
+    parser = Parser("crayonize palettes", "List the boxes of crayons, for --palette.")
+    parser.add_argument("name", metavar="NAME", nargs="?", help="list the crayons of this one")
+    name = parser.read(words).name
+    from ..crayons.palette_files import load_palette, palette_names
 
-    return _list((name, f"{number:3} crayons  {title}") for name, title, number in palette_names())
+    if name is None:
+        return _list((row[0], f"{row[2]:3} crayons  {row[1]}") for row in palette_names())
+    palette = load_palette(name)
+    print(f"{palette.title}, {len(palette.crayons)} crayons")
+    for crayon in palette.crayons:
+        print(f"{swatch(crayon.hex)}{crayon.hex}  {crayon.name}")
+    return 0
 
 
 def _styles(words: Sequence[str]) -> int:

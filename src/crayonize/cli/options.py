@@ -2,8 +2,9 @@
 
 import argparse
 import os
+import tomllib
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from stroke_gen.checks import did_you_mean, printable
 
@@ -41,16 +42,45 @@ class Parser(argparse.ArgumentParser):
 
     def read(self, words: Sequence[str]) -> argparse.Namespace:
         """The options, in any order with the names of files."""
-        known = [option for option in self._option_string_actions if option.startswith("--")]
-        for word in words[: words.index("--")] if "--" in words else words:
-            name = word.partition("=")[0]
+        actions = self._option_string_actions
+        known = [option for option in actions if option.startswith("--")]
+        words, names = _parted(words)
+        named = [word.partition("=")[0] for word in words]
+        for name in named:
             if name.startswith("--") and name not in known:
                 raise ValueError(f"unknown option {printable(name)}{did_you_mean(name, known)}")
-        options, rest = self.parse_known_intermixed_args(words)
+        options, rest = self.parse_known_intermixed_args([*words, *names])
         if rest:
             what = "is no option" if rest[0].startswith("-") else "is one too many"
             raise ValueError(f"{printable(rest[0])} {what}; see {self.prog} --help")
+        _check_effects({actions[name].dest for name in named if name in actions}, options)
         return options
+
+
+def _parted(words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The words before `--`, and those behind it, which are names of files and look it."""
+    at = words.index("--") if "--" in words else len(words)
+    names = (f"./{name}" if name.startswith("-") else name for name in words[at + 1 :])
+    return list(words[:at]), list(names)
+
+
+_ONLY_WITH = {"seconds": "timelapse", "show_tip": "timelapse", "fit": "print", "margin": "print"}
+_NOT_WITH = {"size": ("print", "dpi"), "sheet_mm": ("print",)}  # what settles it instead
+
+
+def _check_effects(given: set[str], options: argparse.Namespace) -> None:
+    """ValueError for an option that has been given and would change nothing."""
+    for name, needed in _ONLY_WITH.items():
+        if name in given and getattr(options, needed) is None:
+            raise ValueError(f"{_option(name)} changes nothing without --{needed}")
+    for name, others in _NOT_WITH.items():
+        for other in others:
+            if name in given and other in given:
+                raise ValueError(f"{_option(name)} changes nothing: --{other} settles it")
+
+
+def _option(dest: str) -> str:
+    return "--sheet" if dest == "sheet_mm" else f"--{dest.replace('_', '-')}"
 
 
 def photo_parser() -> Parser:
@@ -86,6 +116,8 @@ def photo_parser() -> Parser:
         default="crayon",
         help="what is drawn with: crayon, oil-pastel or pencil (%(default)s)",
     )
+    add("--set", dest="knobs", type=_knob, action="append", default=[], metavar="KEY=VALUE",
+        help="a key of the style otherwise: lines=2, fill.legs=5; may be repeated")  # fmt: skip
     add("--age", type=_whole, help="of the one who draws in style child, 3 to 10")
     add("--left-handed", action="store_true", help="hatching leans the other way")
     add(
@@ -187,6 +219,17 @@ def _medium(word: str) -> str:
     if word not in MEDIA:
         raise argparse.ArgumentTypeError(f"{word!r} is no medium{did_you_mean(word, MEDIA)}")
     return MEDIA[word]
+
+
+def _knob(text: str) -> tuple[str, Any]:
+    """A key of a style and its value as TOML has it, or as the word it is."""
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise argparse.ArgumentTypeError(f"{text!r} is not KEY=VALUE, such as lines=2")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except (ValueError, RecursionError):
+        return key, value
 
 
 def _whole(text: str) -> int:

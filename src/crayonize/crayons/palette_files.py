@@ -4,6 +4,7 @@ of colours.
 No numpy here: the command line lists palettes without waiting for it.
 """
 
+import itertools
 import json
 import os
 import re
@@ -45,8 +46,8 @@ def load_palette(source: "str | os.PathLike[str] | dict[str, Any] | Palette") ->
 
     source: a shipped name ("box24"); a path ending in .json (the format of the shipped ones), .gpl
     (GIMP), .txt or .hex (one #rrggbb a line, a name after it if you like, comments begin with "#
-    "); a comma list "#ff0000,#00ff00 grass"; the content of a palette .json as a dict; a Palette,
-    handed back as it is.
+    "); a list "#ff0000,#00ff00 grass" or "#ff0000 #00ff00"; the content of a palette .json as a
+    dict; a Palette, handed back as it is.
 
     Crayon names are put in lower case with single spaces; a colour without a name is called by its
     #rrggbb. A colour without hiding gets one from its lightness and chroma, see `default_hiding`.
@@ -66,7 +67,7 @@ def load_palette(source: "str | os.PathLike[str] | dict[str, Any] | Palette") ->
     if text in _shipped():
         return _from_file(_DATA / f"{text}.json", text)
     if text.lstrip().startswith("#"):
-        return _from_comma_list(text)
+        return _from_list(text)
     return _from_file(Path(text), printable(text))
 
 
@@ -127,6 +128,8 @@ def _text_of(path: Path, where: str) -> str:
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        if b"\0" not in raw and path.suffix.lower() != ".json":
+            return raw.decode("latin-1")  # as older programs wrote it
         line = raw[: error.start].count(b"\n") + 1
         raise ValueError(f"{where}: line {line}: not UTF-8 text") from error
 
@@ -203,13 +206,13 @@ def _layer_crayon(data: dict[str, Any], film_um: float, layer_um: float, where: 
 
 
 def _from_gimp_text(text: str, where: str, stem: str) -> Palette:
-    """GIMP's palette text: `GIMP Palette`, `Name:`, `Columns:` and `#` lines, then `R G B name`
-    lines.
+    """GIMP's palette text: `GIMP Palette`, lines like `Name:` or `Channels: RGBA` and comments
+    after `#`, then `R G B name` lines, with A before the name if the channels are RGBA.
     """
     lines = text.splitlines()
     if not lines or lines[0].strip() != "GIMP Palette":
         raise ValueError(f'{where}: line 1: a .gpl file begins with "GIMP Palette"')
-    title, found = stem, []
+    title, found, channels = stem, [], 3
     for number, line in enumerate(lines[1:], start=2):
         line = line.strip()
         if line.startswith("Name:"):
@@ -219,35 +222,37 @@ def _from_gimp_text(text: str, where: str, stem: str) -> Palette:
                 )
                 or stem
             )
-        elif line and not line.startswith(("#", "Columns:")):
-            found.append(
-                (f"{where}: line {number}", *_gimp_colour(line, f"{where}: line {number}"))
-            )
+        elif re.match(r"Channels:\s*RGBA\b", line):
+            channels = 4
+        elif line and not re.match(r"#|[A-Za-z]+:", line):
+            place = f"{where}: line {number}"
+            found.append((place, *_gimp_colour(line, channels, place)))
     return _from_colours(found, where, stem, title)
 
 
-def _gimp_colour(line: str, where: str) -> tuple[str, str]:
-    words = line.split(maxsplit=3)
-    if len(words) < 3 or not all(
+def _gimp_colour(line: str, channels: int, where: str) -> tuple[str, str]:
+    words = line.split(maxsplit=channels)
+    if len(words) < channels or not all(
         re.fullmatch("[0-9]{1,3}", word) and int(word) <= 255 for word in words[:3]
     ):
         raise ValueError(f"{where}: {quoted(line)} does not begin with three numbers from 0 to 255")
-    name = words[3] if len(words) == 4 and words[3].strip().lower() != "untitled" else ""
+    name = "".join(words[channels:]).strip()
+    name = "" if name.lower() == "untitled" else name
     return "#{:02x}{:02x}{:02x}".format(*map(int, words[:3])), name
 
 
 def _from_hex_text(text: str, where: str, stem: str) -> Palette:
     found = []
     for number, line in enumerate(text.splitlines(), start=1):
-        line = line.strip()
-        if line and line != "#" and not line.startswith(("# ", "#\t", "##")):
-            found.append((f"{where}: line {number}", *_hex_item(line, f"{where}: line {number}")))
+        line, place = line.strip(), f"{where}: line {number}"
+        if line and line != "#" and not line.startswith(("# ", "#\t", "##", ";")):
+            found += [(place, *_hex_item(item, place)) for item in _items(line)]
     return _from_colours(found, where, stem, stem)
 
 
-def _from_comma_list(text: str) -> Palette:
+def _from_list(text: str) -> Palette:
     where = "palette list"
-    items = [item.strip() for item in text.split(",")]
+    items = [item for part in text.split(",") for item in _items(part.strip())]
     _check_count(len(items), where)
     found = [
         (f"{where}: item {i}", *_hex_item(item, f"{where}: item {i}"))
@@ -256,12 +261,19 @@ def _from_comma_list(text: str) -> Palette:
     return _from_colours(found, where, "custom", "list of colours")
 
 
+def _items(line: str) -> list[str]:
+    """The colours of a line: several may stand in one, each with its #."""
+    return re.split(r"\s+(?=#[0-9a-fA-F]{6}(?:\s|$))", line)
+
+
 def _hex_item(text: str, where: str) -> tuple[str, str]:
     """`#rrggbb`, a name after it if any, and a comment after that (` # ...`); the first # may be
-    left out.
+    left out, and aarrggbb is what Paint.NET writes.
     """
     words = text.split(" #", 1)[0].split(maxsplit=1)
     word = words[0] if words else ""
+    if re.fullmatch("[0-9a-fA-F]{8}", word):
+        word = word[2:]
     if not is_hex(word):
         raise ValueError(f'{where}: {quoted(word)} is not #rrggbb (a comment begins with "# ")')
     return "#" + word[-6:], words[1] if len(words) == 2 else ""
@@ -270,15 +282,27 @@ def _hex_item(text: str, where: str) -> tuple[str, str]:
 def _from_colours(
     found: Sequence[tuple[str, str, str]], where: str, stem: str, title: str
 ) -> Palette:
-    """A palette of bare colours: (where it stands, #rrggbb, name or "") each."""
-    _check_count(len(found), where)
-    crayons = []
+    """A palette of bare colours: (where it stands, #rrggbb, name or "") each.
+
+    A colour that comes again is the same crayon; a name that comes again is numbered.
+    """
+    crayons: dict[str, Crayon] = {}
     for place, given, name in found:
         colour = given.lower()
         named = _crayon_name(name or colour, place)
-        crayons.append(colour_crayon(named, colour, default_hiding(colour), _DEFAULT_FILM_UM))
-    made = _all_different(crayons, [place for place, _, _ in found])
+        if colour not in crayons:
+            named = _numbered(named, {crayon.name for crayon in crayons.values()})
+            hiding = default_hiding(colour)
+            crayons[colour] = colour_crayon(named, colour, hiding, _DEFAULT_FILM_UM)
+    _check_count(len(crayons), where)
+    made = tuple(crayons.values())
     return Palette(stem, title, f"colours of {where}", _DEFAULT_FILM_UM, made)
+
+
+def _numbered(name: str, taken: set[str]) -> str:
+    """The name, or the first of `name 2`, `name 3`, ... that is free."""
+    tries = itertools.chain([name], (f"{name} {n}" for n in itertools.count(2)))
+    return next(one for one in tries if one not in taken)
 
 
 # ---- checks --------------------------------------------------------------------------------------

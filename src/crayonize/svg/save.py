@@ -3,7 +3,8 @@
 One layer per crayon, light to dark, and in each the strokes in drawing order: a plotter is handed
 one crayon after the other. All in millimetres. A stroke's force, which SVG has no word for, stands
 as `data-force` (one number, or one for each point), its tip as `stroke-width` and `data-tip`. The
-order of strokes across crayons is lost; the JSON file keeps it.
+order of strokes across crayons is lost, and points that a straight line and an even change of force
+stand for are left out, so that other programs open it too; the JSON file keeps all.
 """
 
 import os
@@ -15,11 +16,14 @@ from numpy.typing import NDArray
 
 from stroke_gen.drawing import Drawing, Stroke, check_drawing
 from stroke_gen.files import whole_file
+from stroke_gen.jit import kernel
 
 from ..crayons.palette import Palette
 from ..crayons.palette_files import load_palette
 from ..crayons.used import by_crayon
 
+TOLERANCE_MM = 0.02  # by which a path may be off: a fifth of a fine pen's line
+FORCE_TOLERANCE = 0.04  # of a stroke's greatest force
 DAB_MM = 0.01  # a point is drawn as a line this long: plotters and viewers drop lines of no length
 
 
@@ -63,14 +67,50 @@ def _path(stroke: Stroke) -> str:
     tip = f' data-tip="{stroke.tip.kind}"' if stroke.tip.kind != "blunt" else ""
     tip += f' data-angle="{stroke.tip.angle_deg:.4g}"' if stroke.tip.angle_deg else ""
     note = f" data-note={quoteattr(stroke.note)}"
-    points = stroke.path_mm.astype(np.float64)
+    kept = simplified(stroke.path_mm, stroke.force_n)
+    points = stroke.path_mm[kept].astype(np.float64)
     if len(points) == 1:
         points = np.concatenate([points, points + np.array([DAB_MM, 0])])
     return (
         f'<path stroke-width="{stroke.tip.width_mm:.4g}"{tip}{note} '
-        f'data-force="{_forces(stroke.force_n)}" '
+        f'data-force="{_forces(stroke.force_n[kept])}" '
         f'd="{_outline(points)}"/>\n'
     )
+
+
+def simplified(path_mm: NDArray[np.float32], force_n: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """The points (n,) of a path that are needed: between them it is a straight line and its force
+    changes evenly, within the tolerances.
+    """
+    force = force_n * (TOLERANCE_MM / FORCE_TOLERANCE / max(float(force_n.max()), 1e-6))
+    kept = np.zeros(len(path_mm), np.bool_)
+    _simplify(np.column_stack([path_mm, force]).astype(np.float64), TOLERANCE_MM, kept)
+    return kept
+
+
+@kernel
+def _simplify(points, tolerance, kept):  # type: ignore[no-untyped-def]
+    """Mark the points (n, 3) to be kept: x, y and force as a length (Douglas and Peucker 1973)."""
+    last = len(points) - 1
+    kept[0] = kept[last] = True
+    parts = [(0, last)]
+    while parts:
+        a, b = parts.pop()
+        wx, wy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+        square = wx * wx + wy * wy
+        worst, at = tolerance, -1
+        for i in range(a + 1, b):
+            dx, dy = points[i, 0] - points[a, 0], points[i, 1] - points[a, 1]
+            share = (dx * wx + dy * wy) / square if square > 0 else 0.0
+            share = min(max(share, 0.0), 1.0)
+            even = points[a, 2] + share * (points[b, 2] - points[a, 2])
+            off = max(np.hypot(dx - share * wx, dy - share * wy), abs(points[i, 2] - even))
+            if off > worst:
+                worst, at = off, i
+        if at >= 0:
+            kept[at] = True
+            parts.append((a, at))
+            parts.append((at, b))
 
 
 def _forces(force: NDArray[np.float32]) -> str:

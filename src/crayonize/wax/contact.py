@@ -25,6 +25,8 @@ from .window import (
     DITHER_Y,
     GRITTY,
     HEIGHT,
+    LEAN_X,
+    LEAN_Y,
     OWN,
     PRESENT,
     REGAINED,
@@ -86,6 +88,7 @@ def press(w, mask, wax, side, reach, cols, own):  # type: ignore[no-untyped-def]
     w.hand[HEIGHT] = 1e9  # lifted: from far below, float32 would miss the paper
     w.hand[WALKED] = w.hand[CONTACTS] = w.hand[CARRIED] = w.hand[GRITTY] = w.hand[WORN] = 0
     w.hand[OWN] = own
+    w.hand[LEAN_X] = w.hand[LEAN_Y] = 0
     mx, my = mx / present, my / present
     w.hand[SPREAD_XX] = xx / present - mx * mx
     w.hand[SPREAD_XY] = xy / present - mx * my
@@ -128,6 +131,15 @@ def _grip(own, along):  # type: ignore[no-untyped-def]
     return np.float32(2) * chance - np.float32(1)
 
 
+@inner_kernel
+def _lean(w, side, slope_x, slope_y):  # type: ignore[no-untyped-def]
+    """Lower the tip by so many um from cell to cell, to the side to which the crayon leans."""
+    for j in range(side):
+        below = slope_y * np.float32(j - side // 2)
+        for i in range(side):
+            w.over[j * side + i] += below + slope_x * np.float32(i - side // 2)
+
+
 @lean_kernel
 def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyped-def]
     """One contact, for `stride` cells of the way: adjust the height, smear, deposit; returns the
@@ -148,6 +160,9 @@ def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyp
     inside = look(w, side, held.present, top, left, table.rows, table.cols, c.firm, table.columns)
     if inside <= 0:
         return np.float32(0)
+
+    if w.hand[LEAN_X] != 0 or w.hand[LEAN_Y] != 0:
+        _lean(w, side, c.lean * np.float32(w.hand[LEAN_X]), c.lean * np.float32(w.hand[LEAN_Y]))
 
     # The tip sinks until the paper bears the force, but for what the wax itself does not bear.
     grip = one + c.slip * _grip(np.int64(w.hand[OWN]), contact * stride / c.slip_cells)
@@ -182,7 +197,8 @@ def touch(w, held, table, x, y, force, vx, vy, stride):  # type: ignore[no-untyp
 
 @lean_kernel
 def move(w, held, table, a, b):  # type: ignore[no-untyped-def]
-    """Draw on from point a to point b, each x, y in cells and force in N; returns the wax given.
+    """Draw on from point a to point b, each x, y in cells and force in N, and maybe the crayon's
+    slope; returns the wax given.
 
     There is a contact every so many cells: a share `step` of the tip's extent along the way, at
     least one.
@@ -193,10 +209,14 @@ def move(w, held, table, a, b):  # type: ignore[no-untyped-def]
         return 0.0
     vx, vy = dx / length, dy / length
     stride = max(np.float32(1), table.constants.step * _extent(w, vx, vy))
+    w.hand[LEAN_X] = w.hand[LEAN_Y] = 0
     given, ahead = 0.0, np.float32(w.hand[AHEAD]) * stride
     while ahead < length:
         t = ahead / length
         force = a[2] + t * (b[2] - a[2])
+        if a.size > 3:
+            w.hand[LEAN_X] = a[3] + t * (b[3] - a[3])
+            w.hand[LEAN_Y] = a[4] + t * (b[4] - a[4])
         given += touch(w, held, table, a[0] + t * dx, a[1] + t * dy, force, vx, vy, stride)
         ahead += stride
     w.hand[AHEAD] = (ahead - length) / stride
@@ -213,6 +233,8 @@ def lift(w, held, table, b, carried):  # type: ignore[no-untyped-def]
     given = 0.0
     if w.hand[CONTACTS] == 0:
         across, still = np.float32(1), np.float32(0)
+        if b.size > 3:
+            w.hand[LEAN_X], w.hand[LEAN_Y] = b[3], b[4]
         slides = max(np.float32(w.hand[WALKED]), DAB * _extent(w, across, still))
         given += touch(w, held, table, b[0], b[1], b[2], across, still, slides)
     carry_off(w, held.side, carried)
@@ -221,9 +243,9 @@ def lift(w, held, table, b, carried):  # type: ignore[no-untyped-def]
 
 @lean_kernel
 def stroke(w, held, table, points, carried):  # type: ignore[no-untyped-def]
-    """A stroke over points (n, 3) from press to lift; returns the wax given, in um times cells.
+    """A stroke over points (n, 3 or 5) from press to lift.
 
-    carried: by crayon, is added the wax that leaves with the tip.
+    Returns the wax given, in um times cells; carried: by crayon, is added what leaves with the tip.
     """
     given = 0.0
     for i in range(1, len(points)):

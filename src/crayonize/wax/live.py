@@ -49,9 +49,46 @@ class Change:
 class Live:
     """A sheet to draw on by hand: `press` a crayon on it, `move` it any number of times, `lift` it.
 
-    x and y are in mm on the sheet, force is in newton; all are taken to a thousandth, as a
-    drawing's file has them. ValueError, one line, for numbers that no drawing may hold, unknown
-    crayons and calls out of order. Made for one thread.
+    Each call changes the wax at once, as `crayonize.draw` would for the whole stroke, and returns
+    the part of the picture that it has changed. x and y are in mm on the sheet, force is in newton;
+    all numbers are taken to a thousandth, as a drawing's file has them, so that a drawing saved and
+    drawn again is the same picture (but for the grooves of strokes that bend, see the module). Made
+    for one thread.
+
+    A crayon may be tilted: how far its axis leans from upright, and its azimuth, to where on the
+    sheet it leans (0 to the right, 90 down), both in degrees. The tip presses harder on that side,
+    until it is worn to lie flat. A stylus that reports its slopes u to the right and v towards the
+    hand has the tilt atan(hypot(tan u, tan v)) and the azimuth atan2(tan v, tan u).
+
+    Parameters
+    ----------
+    drawing: says the sheet, its paper, its crayons and seed; strokes that it has are drawn first.
+    size: of the picture's long side in pixels, 1 to 20000.
+    light: shade the relief of paper and wax.
+    threads: at most so many at once for those first strokes. None: all cores.
+
+    Attributes
+    ----------
+    light: as above; may be changed at any time, and holds for all that is shown from then on.
+
+    Raises
+    ------
+    ValueError: one line for a drawing that breaks a limit, an unknown paper or palette, a size out
+        of range; in the methods for numbers that no drawing may hold, unknown crayons and calls out
+        of order. The sheet is then as it was.
+    MemoryError: for a picture that this computer's memory does not hold.
+
+    Examples
+    --------
+    >>> from stroke_gen.drawing import Drawing
+    >>> sheet = Live(Drawing(60, 40, "drawing", "box8", ()), size=120)
+    >>> sheet.press(10, 20, 2.0, "red")
+    >>> change = sheet.move(50, 20, 2.0)
+    >>> change.top, change.left, change.pixels.shape
+    (33, 13, (14, 94, 3))
+    >>> _ = sheet.lift()
+    >>> len(sheet.drawing().strokes)
+    1
     """
 
     def __init__(
@@ -62,11 +99,7 @@ class Live:
         light: bool = True,
         threads: int | None = None,
     ) -> None:
-        """drawing: says the sheet, its paper and its crayons; strokes that it has are drawn first.
-
-        size: of the picture's long side in pixels.   light: shade the relief.   threads: for those
-            first strokes.
-        """
+        """Lay the sheet ready and draw what the drawing has; see the class."""
         _, self.easel = api.redraw(drawing, size, threads)
         self.light = light
         self._drawing, self._strokes = drawing, list(drawing.strokes)
@@ -81,23 +114,68 @@ class Live:
         crayon: str,
         tip: Tip | None = None,
         note: str = "line",
+        tilt_deg: float = 0.0,
+        azimuth_deg: float = 0.0,
     ) -> None:
-        """Put a crayon on the paper. Nothing shows before it is moved or lifted."""
+        """Put a crayon on the paper. Nothing shows before it is moved or lifted.
+
+        Parameters
+        ----------
+        x_mm, y_mm: where, up to the sheet's own size beyond its edges.
+        force_n: 0 to 100.
+        crayon: its name in the palette.
+        tip: the end that touches the paper. None: blunt, 2.4 mm.
+        note: what the stroke is for, any word.
+        tilt_deg, azimuth_deg: 0 to 80 and -360 to 360.
+
+        Raises
+        ------
+        ValueError: as in the class; and if a crayon is on the paper already.
+        """
         if self._hand:
             raise ValueError("press: a crayon is on the paper; lift it first")
-        dab = Stroke(*_point(x_mm, y_mm, force_n), crayon, tip or Tip(), note)
+        path_mm, force, tilt = _point(x_mm, y_mm, force_n, tilt_deg, azimuth_deg)
+        dab = Stroke(path_mm, force, crayon, tip or Tip(), note, tilt)
         self._check(dab, "press")
         self._hand = _Hand(self.easel, dab)
 
-    def move(self, x_mm: float, y_mm: float, force_n: float) -> Change:
-        """Draw straight on to a point; the force changes evenly on the way."""
+    def move(
+        self,
+        x_mm: float,
+        y_mm: float,
+        force_n: float,
+        tilt_deg: float = 0.0,
+        azimuth_deg: float = 0.0,
+    ) -> Change:
+        """Draw straight on to a point; force and tilt change evenly on the way.
+
+        Parameters are those of `press`. The first half millimetre of a stroke is waited for: it
+        says which way the stroke goes.
+
+        Returns
+        -------
+        What has changed, maybe nothing.
+
+        Raises
+        ------
+        ValueError: as in the class; and if no crayon is on the paper.
+        """
         hand = self._held("move")
-        path_mm, force = _point(x_mm, y_mm, force_n)
-        self._check(replace(hand.dab, path_mm=path_mm, force_n=force), "move")
-        return self._change(hand, hand.move(path_mm, force))
+        path_mm, force, tilt = _point(x_mm, y_mm, force_n, tilt_deg, azimuth_deg)
+        self._check(replace(hand.dab, path_mm=path_mm, force_n=force, tilt_deg=tilt), "move")
+        return self._change(hand, hand.move(path_mm, force, tilt))
 
     def lift(self) -> Change:
-        """End the stroke; one that was too short to leave a mark becomes a dab."""
+        """End the stroke; one that was too short to leave a mark becomes a dab.
+
+        Returns
+        -------
+        What has changed, maybe nothing.
+
+        Raises
+        ------
+        ValueError: if no crayon is on the paper.
+        """
         hand = self._held("lift")
         self._hand = None
         cells = hand.lift()
@@ -105,11 +183,21 @@ class Live:
         return self._change(hand, cells)
 
     def picture(self) -> NDArray[np.uint8]:
-        """The whole sheet, uint8 sRGB (rows, cols, 3)."""
+        """The whole sheet as it is now.
+
+        Returns
+        -------
+        uint8 sRGB (rows, cols, 3).
+        """
         return self.easel.picture_srgb(self.light)
 
     def drawing(self) -> Drawing:
-        """All strokes so far, but for one under way: to be saved, or drawn again."""
+        """All strokes so far, but for one under way: to be saved, or drawn again.
+
+        Returns
+        -------
+        The drawing given at first, with these strokes.
+        """
         return replace(self._drawing, strokes=tuple(self._strokes))
 
     def _practise(self) -> None:
@@ -119,7 +207,8 @@ class Live:
         for array in self.easel.sheet.columns():
             array[::1024] += 0  # memory comes page by page, each when it is first written to
         crayon = self.easel.box.palette.crayons[0].name
-        hand = _Hand(self.easel, Stroke(*_point(0, 0, 0), crayon, Tip()))
+        path_mm, force, tilt = _point(0, 0, 0)
+        hand = _Hand(self.easel, Stroke(path_mm, force, crayon, Tip(), tilt_deg=tilt))
         self._change(hand, hand.move(*_point(1, 0, 0)))
         hand.lift()
         self.easel.box.drawn[crayon] -= 1  # it was none of the drawing's
@@ -160,7 +249,8 @@ class _Hand:
         self.easel, self.dab = easel, dab
         self._wax = easel.box.palette.index(dab.crayon)
         self._table = table_of(easel.sheet, easel.box, easel.smears)
-        self._path, self._force = [dab.path_mm], [dab.force_n]
+        assert dab.tilt_deg is not None
+        self._path, self._force, self._tilt = [dab.path_mm], [dab.force_n], [dab.tilt_deg]
         self._drawn = 0  # number of the point up to which the stroke is drawn
         self._given = 0.0  # wax, in um times cells
         # that leaves on the tip, by crayon
@@ -168,15 +258,18 @@ class _Hand:
 
     def stroke(self, since: int = 0) -> Stroke:
         """The stroke, or what of it begins with one of its points."""
-        path_mm, force = np.concatenate(self._path[since:]), np.concatenate(self._force[since:])
-        return replace(self.dab, path_mm=path_mm, force_n=force)
+        path_mm, force, tilt = (
+            np.concatenate(points[since:]) for points in (self._path, self._force, self._tilt)
+        )
+        return replace(self.dab, path_mm=path_mm, force_n=force, tilt_deg=tilt)
 
-    def move(self, path_mm: Floats, force: Floats) -> Floats:
+    def move(self, path_mm: Floats, force: Floats, tilt: Floats) -> Floats:
         """Go on to a point; returns the points (n, 3) in cells over which it now was drawn, or
         none.
         """
         self._path.append(path_mm)
         self._force.append(force)
+        self._tilt.append(tilt)
         if not self.side:
             points, first = in_cells([self.stroke()], self.easel.sheet.cell_mm)
             if ways(points, first)[1][0] * self.easel.sheet.cell_mm < SETTLE_MM:
@@ -222,9 +315,13 @@ class _Hand:
         box.book(stroke.crayon, self._given, self._carried)
 
 
-def _point(x_mm: float, y_mm: float, force_n: float) -> tuple[Floats, Floats]:
-    """A point as a path and its force, to the thousandth."""
+def _point(
+    x_mm: float, y_mm: float, force_n: float, tilt_deg: float = 0.0, azimuth_deg: float = 0.0
+) -> tuple[Floats, Floats, Floats]:
+    """A point as a path, its force and its tilt, to the thousandth."""
     with np.errstate(over="ignore"):  # beyond float32 is beyond any sheet, and refused as such
-        return np.array([[x_mm, y_mm]]).round(3).astype(np.float32), np.array([force_n]).round(
-            3
-        ).astype(np.float32)
+        path_mm, force, tilt = (
+            np.array(values).round(3).astype(np.float32)
+            for values in ([[x_mm, y_mm]], [force_n], [[tilt_deg, azimuth_deg]])
+        )
+    return path_mm, force, tilt

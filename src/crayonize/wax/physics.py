@@ -49,6 +49,7 @@ class Constants(NamedTuple):
     lasts: np.float32  # cells
     track: np.float32  # its deviation, in cells
     speck: np.float32  # um
+    lean: np.float32  # um from cell to cell, for a tangent of 1
     thin: np.float32  # um
     heap: np.float32
     firm: np.float32
@@ -96,8 +97,11 @@ class Physics:
     grain_mm: float  # way that they last, on average
     track_mm: float  # deviation across the tracks that they leave
     speck_um: float  # height of the specks where they are lost
+    # share of the crayon's slope that its tip has: worn as the hand holds it, it mostly fits
+    lean: float
     # how much stronger the wax is coloured than that of crayons, for which palettes are given
     pigment: float
+    tip: float  # how broad the tips are that a drawing is planned with, against a crayon's
     usual: float  # mean of mu * sin(S, F) over a drawing, for the plan of wear
 
     def worn_per_newton_mm(self) -> float:
@@ -158,6 +162,7 @@ class Physics:
             "lasts": self.grain_mm / cell_mm,
             "track": max(self.track_mm / cell_mm, FINEST),
             "speck": self.speck_um,
+            "lean": self.lean * 1000 * cell_mm,
             "thin": THIN_UM,
             "heap": self.heap,
             "firm": self.firm,

@@ -25,7 +25,7 @@ Watch = Callable[[NDArray[np.float32], NDArray[np.int64], NDArray[np.float32]], 
 class Work(NamedTuple):
     """Strokes to be drawn, and what is booked of each."""
 
-    points: NDArray[np.float32]  # (n, 3): x, y in cells, force in N
+    points: NDArray[np.float32]  # (n, 3): x, y in cells, force in N; (n, 5): and the slope
     first: NDArray[np.int64]  # (strokes + 1): where each stroke's points begin
     wax_of: NDArray[np.int64]  # (strokes,): its crayon's number
     tip_of: NDArray[np.int64]  # ... its mask's

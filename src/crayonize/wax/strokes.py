@@ -16,13 +16,23 @@ from . import box
 def in_cells(
     strokes: Sequence[Stroke], cell_mm: float
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """All points as (x, y in cells, force), and where each stroke begins."""
+    """All points as (x, y in cells, force), and where each stroke begins.
+
+    If any stroke is drawn with the crayon tilted, points are (x, y, force, slope along x, along y):
+    by how much the tip is lower from one cell to the next, as a tangent.
+    """
     first = np.zeros(len(strokes) + 1, np.int64)
     np.cumsum([len(s.path_mm) for s in strokes], out=first[1:])
-    points = np.empty((int(first[-1]), 3), np.float32)
+    tilts = any(s.tilt_deg is not None and s.tilt_deg[:, 0].any() for s in strokes)
+    points = np.zeros((int(first[-1]), 5 if tilts else 3), np.float32)
     points[:, :2] = np.concatenate([s.path_mm for s in strokes])
     points[:, :2] /= cell_mm
     points[:, 2] = np.concatenate([s.force_n for s in strokes])
+    for begin, stroke in zip(first.tolist() if tilts else (), strokes, strict=False):
+        if stroke.tilt_deg is not None:
+            tilt, azimuth = np.deg2rad(stroke.tilt_deg.T)
+            towards = np.stack([np.cos(azimuth), np.sin(azimuth)], 1)
+            points[begin : begin + len(azimuth), 3:] = np.tan(tilt)[:, None] * towards
     return points, first
 
 

@@ -24,9 +24,9 @@ GRAINS = 6  # hard grains that stand out of a tip at most
 # What `hand` holds: height of the tip (um), offsets (cells), strides to the next contact, cells
 # walked, contacts so far, the stroke's own number, how many crayons' wax sticks to the tip, what it
 # regained of its own at this contact (um), how many grains stand out of it, contacts since it was
-# worn down, and how it spreads about its middle (cells^2).
+# worn down, the crayon's slope along x and y, and how its tip spreads about its middle (cells^2).
 HEIGHT, DITHER_X, DITHER_Y, AHEAD, WALKED, CONTACTS, OWN, CARRIED, REGAINED, GRITTY = range(10)
-WORN, SPREAD_XX, SPREAD_XY, SPREAD_YY = range(10, 14)
+WORN, LEAN_X, LEAN_Y, SPREAD_XX, SPREAD_XY, SPREAD_YY = range(10, 16)
 
 Floats = NDArray[np.float32]
 
@@ -105,7 +105,7 @@ def window(cells: int, crayons: int) -> Window:
         load_of=numbers(np.uint8, 256, NONE),
         load_crayon=numbers(np.uint8, LOADS),
         grain=numbers(np.float64, 4 * GRAINS),
-        hand=numbers(np.float64, 14),
+        hand=numbers(np.float64, 16),
     )
 
 
