@@ -17,7 +17,9 @@ WORK_LONG = 640  # cells along the work grid's long side
 RIM = 0.006  # of the long side: a frame that is not drawn
 WIDE = 3.0  # cells: wide enough a bell to look smooth on its grid
 WHITE = 0.83  # OKLab L from which what has no colour turns into bare paper
-KNEE = 0.15  # OKLab L above the darkest crayon from which tones are kept
+KNEE = 0.15  # OKLab L above the darkest crayon from which tones may stay as they are
+LOCAL = 4.0  # tips: over less than that, contrast stays as it is when tones are drawn together
+FLATTEST = 0.9  # share of the crayons' range of tones that a photo is taken to have at least
 WARM = np.deg2rad(58)  # OKLab hue of skin
 
 
@@ -159,22 +161,29 @@ def _toe(lightness: Floats, low: float, darkest: float) -> Floats:
     ).astype(np.float32)
 
 
-def tone_map(lab: Floats, swatches: Swatches, style: Style) -> Floats:
-    """A photo's OKLab colours brought into what paper and crayons can give, its lightness kept in
-    order.
+def tone_map(lab: Floats, swatches: Swatches, style: Style, tip: float) -> Floats:
+    """A photo's OKLab colours brought into what paper and crayons can give; tip in cells.
+
+    Tones may stay as they are, with only the darks drawn together, or all be drawn together alike,
+    from the darkest crayon to the paper: `style.lift` says how far. What is finer than a few tips
+    keeps its contrast.
     """
     # on dark paper crayons are the light
     given = np.append(swatches.lightness(), oklab(swatches.paper)[0])
     darkest, lightest = float(given.min()), float(given.max())
-    out = lab.copy()
-    out[..., 0] = np.minimum(
-        _toe(lab[..., 0], float(np.percentile(lab[..., 0], 0.5)), darkest), lightest
+    out, light = lab.copy(), lab[..., 0]
+    low, high = np.percentile(light, (0.5, 98)).tolist()
+    base = np.asarray(
+        cv2.ximgproc.guidedFilter(light, light, max(2, round(LOCAL * tip)), 4e-3), np.float32
     )
-    out[..., 0] += 4 * style.lift * out[..., 0] * (1 - out[..., 0])
+    spread = min(low + FLATTEST * (lightest - darkest), lightest)  # what is light stays light
+    dark, bright = min(low, darkest), max(high, spread)
+    straight = darkest + (base - dark) * (lightest - darkest) / (bright - dark)
+    tone = style.lift * straight + (1 - style.lift) * _toe(base, low, darkest)
+    out[..., 0] = np.clip(tone + light - base, darkest, lightest)
     chroma = np.hypot(lab[..., 1], lab[..., 2])
-    white = np.clip((out[..., 0] - WHITE) / (lightest - WHITE - 0.03), 0, 1) * np.clip(
-        2 - chroma / 0.03, 0, 1
-    )
+    paling = max(lightest - WHITE - 0.03, 0.01)  # no crayon may be that light on dark paper
+    white = np.clip((out[..., 0] - WHITE) / paling, 0, 1) * np.clip(2 - chroma / 0.03, 0, 1)
     out[..., 0] += white * white * (3 - 2 * white) * (lightest - out[..., 0])
     warm = np.clip(
         (lab[..., 1] * np.cos(WARM) + lab[..., 2] * np.sin(WARM)) / (chroma + 1e-6), 0, 1

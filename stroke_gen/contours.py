@@ -32,6 +32,7 @@ LEAST_PRESSURE = 0.38  # N/mm^2: a line that is meant
 CURLED = 0.6  # radians a width by which worms along fringes turn: they say nothing
 AREA_WORTH = 3.0  # how much more an area's outline counts than an edge
 LINE_TAPER = 4.0  # tips over which an outline begins and ends
+SMALL = 60.0  # widths across, of a thing in which no lines are drawn
 LONGEST = 40.0  # tips: a longer line is drawn in several strokes
 
 
@@ -165,10 +166,20 @@ def _lines(
         fair.first,
     )
     mean = mean * np.clip((CURLED - _turning(fair) * width) / 0.3, 0, 1)
+    within = _means(_sample(_small(who, SMALL * width), fair.points), fair.first)
+    mean = np.where((within > 0.7) & (rim < 0.35), 0, mean)  # strokes tell what is in a small thing
     worth = factor * mean * np.diff(fair.first) ** 0.5 * (0.5 + care + 2 * rim)
     return Lines(fair.points, fair.first, contrast, worth).only(
         np.flatnonzero(mean * factor >= 0.08)
     )
+
+
+def _small(mask: Floats, least: float) -> Floats:
+    """Where a mask (h, w) has parts less than `least` cells across."""
+    _, label, stats, _ = cv2.connectedComponentsWithStats((mask > 0.5).astype(np.uint8))
+    small = np.sqrt(stats[:, cv2.CC_STAT_AREA]) < least
+    small[0] = False
+    return small[label].astype(np.float32)
 
 
 def _end_to_end(chains: Sequence[NDArray[Any]]) -> tuple[Floats, NDArray[np.int64]]:
@@ -273,9 +284,9 @@ def _crayons(
     ground = _means(_sample(now, lines.points), lines.first)
     aim = darker.copy()
     aim[:, 0] = np.minimum(darker[:, 0], oklab(ground)[:, 0]) - DARKER
-    hardest = box.pressures >= LEAST_PRESSURE
+    hardest = box.pressures >= min(LEAST_PRESSURE, box.pressures[-1])  # a light hand's firmest
     colours = oklab(box.over(ground))[:, :, hardest]
-    off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 0.7, 0.7]), axis=3)
+    off = np.linalg.norm((colours - aim[:, None, None]) * np.array([1, 1.2, 1.2]), axis=3)
     off += 0.3 * np.maximum(colours[..., 0] - aim[:, None, None, 0] - 0.03, 0)
     skin = _means(_sample(scene.skin, lines.points), lines.first)
     off += BODY_PRICE * skin[:, None, None] * foreign(box, SKIN_RAD)[None, :, None]

@@ -32,7 +32,10 @@ from .swatches import Swatches, firmness
 
 Floats = NDArray[np.float32]
 CROSS = (0, -1, 1, -2)  # turns of the direction from layer to layer, in `cross`
+SPARED = 0.7  # of the pressure, in the whites of eyes and in teeth
 SUBJECT = 0.5  # care from which the finer tip is taken
+FINEST = 0.35  # usual tips
+ACROSS = 45.0  # strokes across a subject at least: a small one takes a finer tip
 Draw = Callable[[list[Stroke]], None]
 Look = Callable[[tuple[int, int]], Floats]
 Stage = Callable[[Floats], list[Stroke]]
@@ -60,8 +63,9 @@ def generate(
     rng = np.random.default_rng([seed, 3])
     strokes: list[Stroke] = []
     with ThreadPoolExecutor(threads, initializer=be_plain) as pool:
-        seen = scene.read(photo, subject, sheet_mm, swatches, style, focus, pool)
-        plan = _plan(seen, swatches, style, rng, pool)
+        filled = swatches.upto(style.hardest)
+        seen = scene.read(photo, subject, sheet_mm, filled, style, focus, pool)
+        plan = _plan(seen, filled, style, rng, pool)
         tip = style.tip_mm / seen.cell_mm
         inside = margin.inside(seen.label.shape, style.margin_mm / seen.cell_mm, tip, rng)
         inside *= margin.faded(seen.care, style.fade, tip, style.wrist_deg, rng)
@@ -91,6 +95,8 @@ def _stages(
     def lines(now: Floats) -> list[Stroke]:
         return contours.outlines(plan, now, inside * (1 - ovals), style, rng)
 
+    firm = replace(plan, swatches=box.only(plan.crayons))  # features are pressed as they ask
+
     def faces(now: Floats) -> list[Stroke]:
         return portrait.draw(seen.subject, seen.natural, inside, box, seen.cell_mm, style, rng)
 
@@ -100,13 +106,12 @@ def _stages(
     for coat in style.passes:
         if coat.kind == "touch":
             yield partial(
-                _touch, plan, inside=inside * (1 - features), coat=coat, style=style, rng=rng
+                _touch, firm, inside=inside * (1 - features), coat=coat, style=style, rng=rng
             )
             continue
         for turn in range(LAYERS) if coat.kind == "fill" else (None,):
-            yield partial(
-                _fill, plan, inside=inside * (1 - white), coat=coat, turn=turn, style=style, rng=rng
-            )
+            some = inside * (1 - np.float32(SPARED) * white)
+            yield partial(_fill, plan, inside=some, coat=coat, turn=turn, style=style, rng=rng)
     yield faces
     yield lines
 
@@ -116,7 +121,8 @@ def _plan(
 ) -> Plan:
     """Take crayons out of the box."""
     mixtures = mixing.find(seen, swatches, style.crayons, rng)
-    return Plan(seen, swatches.only(mixtures.crayons()), mixtures.alone(), pool)
+    chosen = mixtures.crayons()
+    return Plan(seen, chosen, swatches.only(chosen), mixtures.alone(), pool)
 
 
 def _fill(
@@ -139,9 +145,11 @@ def _fill(
     )
     gaps = (1 + style.open * (1 - seen.care)).astype(np.float32)
     careful = seen.care > SUBJECT
+    extent_mm = seen.cell_mm * float(np.sqrt(np.count_nonzero(careful)))
+    fine = min(coat.fine, max(FINEST, extent_mm / (ACROSS * style.tip_mm)))
     parts = []
     for k in sorted(wants, key=lambda k: -plan.swatches.lightness()[k]):
-        for factor, where in ((coat.tip, ~careful), (coat.fine, careful)):
+        for factor, where in ((coat.tip, ~careful), (fine, careful)):
             want = np.where(where, wants[k] * inside, 0).astype(np.float32)
             if want.any():
                 parts.append((k, factor, want))

@@ -20,7 +20,7 @@ from .swatches import Swatches
 Floats = NDArray[Any]
 STEP = 0.6  # cells between points of a path
 FINEST_MM = 0.5  # width of the sharpest tip
-FIRM = (0.5, 0.7, 1.4, 2.0), (1.5, 1.1, 1.0, 0.8)  # widths in mm; N/mm2 for full darkness on wax
+FIRM = (0.5, 0.7, 1.4, 2.0), (1.0, 0.75, 0.65, 0.5)  # widths in mm; N/mm2 for full darkness on wax
 DEPTH = 1.6  # power of a mark's darkness to which the pressure rises
 WOBBLE = 0.06  # widths
 AREAS = "lips", "white"  # drawn at the pressure that gives their colour

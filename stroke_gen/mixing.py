@@ -26,6 +26,9 @@ SAMPLES = 24  # colours by which a surface is judged
 GRAIN_PRICE = 0.25  # OKLab units per unit of grain
 LAYER_PRICE = 0.004  # for each further crayon
 OPPOSED_PRICE = 0.22  # for a hue that opposes the surface's, times how far (see `clash`)
+# for another hue than the surface's, where the box has one of it, times how far (see `chord`)
+HUE_PRICE = 0.2
+OF_IT = 25  # per cent of a surface that are enough for a hue to be one of its own
 GREY_PRICE = 0.45  # for grey in a surface of a hue, times its chroma
 LOUD_PRICE = 0.2  # for a crayon of stronger colour than the surface's, times how much stronger
 # for a crayon darker than the surface's darkest, times the difference of lightness
@@ -34,8 +37,8 @@ BODY_PRICE = np.float32(0.3)  # for a crayon foreign to skin or hair
 DARK_BODY = 0.46  # OKLab L below which skin and hair are dark
 WARM = np.deg2rad(58)  # OKLab hue of both
 SKIN_RAD, HAIR_RAD = np.deg2rad(22), np.deg2rad(40)
+GROUND_SAY = 0.4  # of the ground in the choice of the box; where care is due, 1 more
 BEAM = 3  # mixtures of each length that are tried with one crayon more
-FEW = np.array([0, 1, 3, 4, 6])  # pressures of four crayons; of three and fewer all are tried
 
 
 class Wax(NamedTuple):
@@ -187,11 +190,12 @@ def _try(sample, mixtures, extra, allowed, pressures, wax, cost):  # type: ignor
 
 def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -> Mixtures:
     """A mixture for each family of surfaces, of at most `most` crayons in all."""
-    sample, size = _samples(seen.guide.lab, seen.family, rng)
+    sample = _samples(seen.guide.lab, seen.family, rng)
+    say = np.bincount(seen.family.ravel(), (GROUND_SAY + seen.care).ravel()) / seen.care.size
     order = np.argsort(-swatches.lightness(), kind="stable")
     skin, hair = (np.bincount(seen.family.ravel(), m.ravel()) / np.bincount(seen.family.ravel())
                   for m in (seen.skin, seen.hair))  # fmt: skip
-    extra = prices(sample, swatches) + np.float32(LAYER_PRICE)
+    extra = prices(sample, swatches, np.maximum(skin, hair)) + np.float32(LAYER_PRICE)
     body = skin[:, None] * foreign(swatches, SKIN_RAD) + hair[:, None] * foreign(swatches, HAIR_RAD)
     dark = np.clip((DARK_BODY - sample[:, 0].mean(1)) / 0.08, 0, 1)
     extra += BODY_PRICE * body * (1 - np.outer(dark, blackness(swatches)))
@@ -211,7 +215,7 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     double = np.broadcast_to(pairs[None], (len(sample), *pairs.shape)).copy()
     two = tried(double, every, full)
     allowed = _box(
-        np.hstack([one, two]), [[int(k)] for k in order] + pairs.tolist(), size, number, most
+        np.hstack([one, two]), [[int(k)] for k in order] + pairs.tolist(), say, number, most
     )
     best = np.full((len(sample), LAYERS), -1, np.int64)
     least = np.full(len(sample), np.inf, np.float32)
@@ -225,7 +229,7 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
             wider = _extended(*found[-1], np.flatnonzero(allowed), rank)
             if not wider.size:
                 break
-            found.append((wider, tried(wider, allowed, full if length < 4 else FEW)))
+            found.append((wider, tried(wider, allowed, full if length < 4 else few(len(full) - 1))))
         mixtures, cost = found[length - 1]
         if not cost.size:
             break
@@ -236,26 +240,35 @@ def find(seen: Scene, swatches: Swatches, most: int, rng: np.random.Generator) -
     return Mixtures(best)
 
 
-def _samples(
-    lab: Floats, label: NDArray[np.int32], rng: np.random.Generator
-) -> tuple[Floats, NDArray[np.float64]]:
-    """Colours (surfaces, 3, SAMPLES) of each surface, and its share of the sheet."""
+def few(number: int) -> Ints:
+    """Of no pressure and `number` pressures, those that are tried with four crayons."""
+    return np.unique(np.linspace(0, number, 5).round()).astype(np.int64)
+
+
+def _samples(lab: Floats, label: NDArray[np.int32], rng: np.random.Generator) -> Floats:
+    """Colours (surfaces, 3, SAMPLES) of each surface."""
     flat, colours = label.ravel(), lab.reshape(-1, 3)
     where = np.argsort(flat, kind="stable")
     first = np.searchsorted(flat[where], np.arange(int(flat.max()) + 2))
     chosen = np.stack(
         [where[a + (rng.random(SAMPLES) * (b - a)).astype(np.int64)] for a, b in pairwise(first)]
     )
-    return np.ascontiguousarray(colours[chosen].swapaxes(1, 2)), np.diff(first) / flat.size
+    return np.ascontiguousarray(colours[chosen].swapaxes(1, 2))
 
 
-def prices(sample: Floats, swatches: Swatches) -> Floats:
-    """What a crayon costs in a surface (surfaces, crayons), beside the distance it leaves."""
+def prices(sample: Floats, swatches: Swatches, body: Floats | float = 0.0) -> Floats:
+    """What a crayon costs in a surface (surfaces, crayons), beside the distance it leaves.
+
+    body: how far each surface is skin or hair, 0..1, whose hues have a price of their own.
+    """
     colours = oklab(swatches.over(swatches.paper))
-    hue, heavy = colours[:, -3, 1:], colours[:, -1]
+    hue, heavy = swatches.masstone()[:, 1:], colours[:, -1]
     mean = sample.mean(2)
     chroma = np.linalg.norm(mean[:, 1:], axis=1)
     price = OPPOSED_PRICE * clash(hue[None], mean[:, None, 1:])
+    off = chord(hue[None, :, None], sample.swapaxes(1, 2)[:, None, :, 1:])
+    turned = HUE_PRICE * held(hue, mean[:, 1:]) * (1 - np.asarray(body))
+    price += turned[:, None] * np.percentile(off, OF_IT, axis=2)
     price += GREY_PRICE * np.outer(np.maximum(chroma - 0.025, 0), greyness(heavy))
     loud = np.linalg.norm(hue, axis=1)
     price += LOUD_PRICE * np.maximum(loud[None] - 1.2 * chroma[:, None] - 0.06, 0)
@@ -268,7 +281,7 @@ def foreign(swatches: Swatches, width_rad: float) -> Floats:
     """How foreign each crayon (crayons,) is to skin or hair: 0 within `width_rad` of their hue, 1
     far from it.
     """
-    hue = oklab(swatches.over(swatches.paper))[:, -3]
+    hue = swatches.masstone()
     chroma = np.linalg.norm(hue[:, 1:], axis=1)
     warm = (hue[:, 1] * np.cos(WARM) + hue[:, 2] * np.sin(WARM)) / (chroma + 1e-6)
     off = np.clip((np.arccos(np.clip(warm, -1, 1)) - width_rad) / 0.5, 0, 1)
@@ -295,6 +308,21 @@ def clash(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(0.72 * both - dot, 0)))
 
 
+def chord(one: Floats, other: Floats) -> Floats:
+    """How far apart two hues (..., 2) in a and b are, for the chroma both have: 0 for the same."""
+    dot = one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
+    both = np.sqrt((one**2).sum(-1) * (other**2).sum(-1))
+    return np.asarray(np.sqrt(np.maximum(2 * (both - dot), 0)))
+
+
+def held(hues: Floats, wanted: Floats) -> Floats:
+    """Whether a box of some hues (k, 2) in a and b holds those that are wanted (n, 2): 1 within 20
+    degrees or so, 0 from 45 degrees.
+    """
+    one, other = (h / (np.linalg.norm(h, axis=1, keepdims=True) + 0.01) for h in (hues, wanted))
+    return np.asarray(np.clip(((other @ one.T).max(1) - 0.7) / 0.2, 0, 1), np.float32)
+
+
 def greyness(colours: Floats) -> Floats:
     """How grey OKLab colours (n, 3) are: 1 for a grey, 0 for a hue and for black."""
     chroma = np.linalg.norm(colours[:, 1:], axis=1)
@@ -304,7 +332,7 @@ def greyness(colours: Floats) -> Floats:
 
 
 def _box(
-    cost: Floats, mixtures: list[list[int]], size: NDArray[np.float64], number: int, most: int
+    cost: Floats, mixtures: list[list[int]], say: NDArray[np.float64], number: int, most: int
 ) -> NDArray[np.bool_]:
     """Which crayons to take: starting from all, put back the one least missed until `most` remain
     in use.
@@ -321,7 +349,7 @@ def _box(
             return np.isin(np.arange(number), used)
         allowed[:] = False
         allowed[used] = True
-        missed = [(np.where(holds[:, k], 9, now).min(1) * size).sum() for k in used]
+        missed = [(np.where(holds[:, k], 9, now).min(1) * say).sum() for k in used]
         allowed[used[int(np.argmin(missed))]] = False
 
 

@@ -71,13 +71,14 @@ class Style:
     fade: Annotated[float, 0, 1] = 0.0
     margin_mm: Annotated[float, 0, 50] = 2.0  # paper left along the sheet's border
     chroma: Annotated[float, 0, 3] = 1.0  # colourfulness asked for
-    # middle tones drawn lighter than they are, as paper is lighter than a photo
-    lift: Annotated[float, 0, 0.25] = 0.0
+    # 0: tones as they are, the darkest drawn together; 1: all tones spread from paper to crayon
+    lift: Annotated[float, 0, 1] = 0.7
     skin: Annotated[float, 0, 3] = 0.45  # more colour for pale warm tones, so that skin stays skin
     # the hand's own direction; -50 runs from lower left to upper right
     wrist_deg: Annotated[float, -90, 90] = -50.0
     wrist: Annotated[float, 0, 100] = 0.3  # how much the wrist counts against the form
     press: Annotated[float, 0.1, 5] = 1.0  # factor on all forces
+    hardest: Annotated[float, 0.1, 2] = 2.0  # N/mm^2: the hand fills no harder
     force_spread: Annotated[float, 0, 1] = 0.18  # from line to line
     swell: Annotated[float, 0, 1] = 0.12  # along a line
     wobble: Annotated[float, 0, 1] = 0.05  # tips sideways

@@ -69,7 +69,7 @@ def features(face: Face, lab: Floats, rng: np.random.Generator) -> list[Mark]:
 
 
 def kept(seen: Subject, shape: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
-    """What is left to portraits (h, w), 0..1: by all wax, by touches, by outlines.
+    """What is left to portraits (h, w), 0..1: by most wax, by touches, by outlines.
 
     Whites of eyes and teeth, which marks shade; eyes, brows and mouths; faces.
     """

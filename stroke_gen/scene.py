@@ -58,7 +58,7 @@ def read(
     cell_mm = max(sheet_mm) / analysis.WORK_LONG
     tip = style.tip_mm / cell_mm
     seen = analysis.unframed(analysis.fit(photo, analysis.work_shape(*sheet_mm)))
-    lab = analysis.tone_map(oklab(seen), swatches, style)
+    lab = analysis.tone_map(oklab(seen), swatches, style, tip)
     target = from_oklab(lab)
     detail = pool.submit(lambda: analysis.detail(lab, tip))
     natural = oklab(seen)
@@ -68,7 +68,8 @@ def read(
     calm = oklab(analysis.calmed(target, max(1, round(CALM * tip))))
     structure = pool.submit(lambda: analysis.structure(calm, tip))
     label = surfaces.part(calm, care, subject.mask + skin, tip, style.merge)
-    family = surfaces.families(label, calm, skin + 2 * hair, style.merge)[label].astype(np.int32)
+    kind = skin + 2 * hair + 0.5 * subject.mask
+    family = surfaces.families(label, calm, kind, style.merge)[label].astype(np.int32)
     field = structure.result()
     tangent = surfaces.directions(field, label, care, tip, style.wrist_deg, style.wrist)
     coherence = np.hypot(field[..., 0], field[..., 1]) / (field[..., 2] + 1e-6)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .jit import kernel
-from .mixing import FEW, LAYERS, Mixtures, combine, wax
+from .mixing import LAYERS, Mixtures, combine, few, wax
 from .scene import Scene
 from .swatches import Swatches
 
@@ -29,7 +29,8 @@ class Plan:
     """What stays the same from coat to coat: the scene, and the crayons that make its surfaces."""
 
     scene: Scene
-    swatches: Swatches
+    crayons: list[int]  # of the box
+    swatches: Swatches  # of these crayons
     mixtures: Mixtures
     pool: Executor  # over whose threads work is spread
 
@@ -128,7 +129,7 @@ def plates(plan: Plan, now: Floats, turn: int | None, dark_price: float) -> dict
             ground,
             turn == 0,
             left,
-            FEW if many else full,
+            few(len(full) - 1) if many else full,
             table,
             np.float32(dark_price),
             SHARP,

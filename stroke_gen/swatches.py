@@ -16,6 +16,7 @@ from .colour import oklab
 Floats = NDArray[np.float32]
 TIP_MM = 2.4  # width of the blunt tip that hatched the swatches
 COVERED = 0.3  # linear light by which a ground covered with wax differs from the paper at least
+FIRM = 0.38  # N/mm^2: laid well, but not burnished
 # a tip n times finer needs n**FINER times the pressure for the same colour: it passes sooner
 FINER = 0.75
 
@@ -41,6 +42,23 @@ class Swatches:
     def lightness(self) -> Floats:
         """OKLab L (k,) of each crayon laid heavily on the bare paper."""
         return oklab(self.over(self.paper))[:, -1, 0]
+
+    def upto(self, hardest: float) -> "Swatches":
+        """The table up to `hardest` N/mm^2, the most of a hand; two pressures at least."""
+        n = max(2, int((self.pressures <= hardest + 1e-6).sum()))
+        return Swatches(
+            self.names,
+            self.pressures[:n],
+            np.ascontiguousarray(self.a[:, :, :n]),
+            np.ascontiguousarray(self.b[:, :, :n]),
+            np.ascontiguousarray(self.grain[:, :n]),
+            self.paper,
+        )
+
+    def masstone(self) -> Floats:
+        """OKLab (k, 3) of each crayon laid well, but not burnished, on the bare paper."""
+        p = min(int(np.searchsorted(self.pressures, FIRM - 1e-6)), len(self.pressures) - 1)
+        return oklab(self.over(self.paper))[:, p]
 
     def only(self, chosen: list[int]) -> "Swatches":
         """The table of some of the crayons."""

@@ -154,7 +154,7 @@ def _worthiest(
 ) -> NDArray[np.uint8]:
     """The crayon (h, w) that gains most, where neighbours agree over `coat.cohere` tips."""
     seen, swatches = plan.scene, plan.swatches
-    hues = oklab(swatches.over(swatches.paper))[:, -3, 1:]
+    hues = swatches.masstone()[:, 1:]
     own = np.stack([(plan.mixtures.layers == k).any(1) for k in range(len(swatches.names))])
     body = (seen.skin, foreign(swatches, SKIN_RAD)), (seen.hair, foreign(swatches, HAIR_RAD))
     near = cv2.dilate(

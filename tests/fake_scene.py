@@ -48,7 +48,9 @@ def scene_of(photo: np.ndarray, family: np.ndarray | None = None, **maps) -> Sce
 def plan_of(scene: Scene, pool: Executor, table: Swatches | None = None, most: int = 9) -> Plan:
     """A plan with the crayons that `mixing.find` takes; all of the box stays at hand."""
     table = table or box()
-    return Plan(scene, table, mixing.find(scene, table, most, np.random.default_rng(0)), pool)
+    every = list(range(len(table.names)))
+    mixtures = mixing.find(scene, table, most, np.random.default_rng(0))
+    return Plan(scene, every, table, mixtures, pool)
 
 
 def halves(left, right, shape=(60, 102)) -> np.ndarray:

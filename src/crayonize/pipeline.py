@@ -146,7 +146,7 @@ def sketch(
     long_mm = settings.sheet_mm
     scale = long_mm / max(photo.shape[:2])
     width_mm, height_mm = (max(1.0, round(side * scale, 3)) for side in photo.shape[1::-1])
-    who = subject.see(photo, work_shape(width_mm, height_mm))
+    who = subject.see(photo, work_shape(width_mm, height_mm), settings.mask)
     # all that is looked at; the large one may go
     photo = fit(photo, work_shape(width_mm, height_mm))
     # a pencil's drawing is planned with finer tips than a crayon's

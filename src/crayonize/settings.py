@@ -5,12 +5,16 @@ No heavy imports: the command line reads its defaults here.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from stroke_gen.params import Style
 
     from .crayons.palette import Palette
@@ -19,12 +23,33 @@ if TYPE_CHECKING:
 _PARSED = {  # what is kept -> the choices that it comes from
     "box": {"palette"},
     "ground": {"paper"},
+    "mask": {"subject"},
     "hand": {"style", "force", "age", "left_handed"},
 }
 
 
+SUBJECTS = "auto", "none"
+MASK_SIDE = 1000  # pixels of the picture of a subject that are looked at
 # What can be drawn with, and its constants in data/physics.toml.
 MEDIA = {"crayon": "metric", "oil-pastel": "oil-pastel", "pencil": "pencil"}
+
+
+class Choices(TypedDict, total=False):
+    """The fields of `Settings` as keywords, for type checkers."""
+
+    palette: str | os.PathLike[str] | dict[str, Any]
+    paper: str | os.PathLike[str] | dict[str, Any]
+    style: str | os.PathLike[str] | dict[str, Any]
+    force: str | float
+    size: int
+    sheet_mm: float
+    seed: int
+    physics: str
+    threads: int | None
+    preview: bool
+    age: int | None
+    left_handed: bool
+    focus: tuple[tuple[float, float, float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -49,6 +74,9 @@ class Settings:
     left_handed: bool = False  # hatching from upper left to lower right
     # boxes x, y, w, h in fractions of the picture
     focus: tuple[tuple[float, float, float, float], ...] = ()
+    # auto finds who or what the picture is of, none has no subject, or a picture of it: white on
+    # black, of any size, as a file or an array
+    subject: str | NDArray[Any] = "auto"
 
     @cached_property
     def box(self) -> Palette:
@@ -74,9 +102,25 @@ class Settings:
             style = params.with_age(style, self.age)
         return replace(style, wrist_deg=-style.wrist_deg) if self.left_handed else style
 
+    @cached_property
+    def mask(self) -> NDArray[np.float32] | None:
+        """The subject (h, w), 0..1, or (1, 1) zero for none; None if it is to be found.
+
+        ValueError if there is no such picture.
+        """
+        import numpy as np
+
+        if isinstance(self.subject, str) and self.subject in SUBJECTS:
+            return None if self.subject == "auto" else np.zeros((1, 1), np.float32)
+        from .images.read import open_photo
+
+        with open_photo(self.subject) as picture:
+            light = picture.light(MASK_SIDE, (0.0, 0.0, 0.0)).mean(-1)
+        return np.sqrt(light).astype(np.float32)
+
     def parsed(self) -> Settings:
-        """The same, with palette, paper and style read; ValueError for one that there is not."""
-        _ = self.box, self.ground, self.hand
+        """The same, with palette, paper, style and subject read; ValueError for what is not."""
+        _ = self.box, self.ground, self.hand, self.mask
         return self
 
     def changed(self, **changes: Any) -> Settings:
@@ -92,9 +136,9 @@ class Settings:
         return new
 
     def files(self) -> list[Path]:
-        """Palette, paper and style, where they are given as files."""
+        """Palette, paper, style and subject, where they are given as files."""
         base = self.style.get("extends") if isinstance(self.style, dict) else self.style
-        given = (self.palette, self.paper, base)
+        given = (self.palette, self.paper, base, self.subject)
         return [Path(one) for one in given if isinstance(one, str) and Path(one).is_file()]
 
     def plain(self) -> dict[str, Any]:

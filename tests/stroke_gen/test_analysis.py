@@ -5,7 +5,7 @@ from typing import get_type_hints
 import cv2
 import numpy as np
 import pytest
-from fake_box import box
+from fake_box import PAPER, box
 
 from stroke_gen import analysis
 from stroke_gen.colour import from_oklab, oklab
@@ -81,6 +81,7 @@ def test_work_grid_is_as_long_for_every_sheet(size):
 # ---- tone ----------------------------------------------------------------------------------------
 
 
+TIP = 6.0  # cells
 HIGHEST_LIFT = get_type_hints(Style, include_extras=True)["lift"].__metadata__[1]
 STYLES = {**{name: load_style(name) for name in style_names()}, "lifted": Style(lift=HIGHEST_LIFT)}
 
@@ -94,7 +95,7 @@ def ramp(low=0.0, high=1.0):
 @pytest.mark.parametrize("style", STYLES.values(), ids=STYLES)
 def test_tones_keep_their_order_and_stay_in_reach(style, low, high):
     table = box()
-    light = analysis.tone_map(ramp(low, high), table, style)[0, :, 0]
+    light = analysis.tone_map(ramp(low, high), table, style, TIP)[0, :, 0]
     reachable = oklab(table.over(table.paper))[..., 0]
     assert np.isfinite(light).all()
     assert np.diff(light).min() >= -1e-6
@@ -103,28 +104,36 @@ def test_tones_keep_their_order_and_stay_in_reach(style, low, high):
 
 def test_white_becomes_paper_and_black_the_darkest_crayon():
     table = box()
-    light = analysis.tone_map(ramp(), table, Style())[0, :, 0]
+    light = analysis.tone_map(ramp(), table, Style(), TIP)[0, :, 0]
     assert light[-1] == pytest.approx(oklab(table.paper)[0], abs=1e-3)
     assert light[0] == pytest.approx(table.lightness().min(), abs=1e-3)
 
 
 def test_fog_is_not_stretched():
     lab = ramp(0.4, 0.42)
-    assert np.ptp(analysis.tone_map(lab, box(), Style())[..., 0]) <= np.ptp(lab[..., 0]) * 1.05
+    assert np.ptp(analysis.tone_map(lab, box(), Style(), TIP)[..., 0]) <= np.ptp(lab[..., 0]) * 1.05
 
 
 @pytest.mark.parametrize("paper", [(0.012, 0.011, 0.012), (0.45, 0.26, 0.11)])
 def test_on_dark_paper_light_crayons_reach_the_lights(paper):
     table = box(np.array(paper, np.float32))
-    light = analysis.tone_map(ramp(), table, Style())[0, :, 0]
+    light = analysis.tone_map(ramp(), table, Style(), TIP)[0, :, 0]
     assert light[-1] == pytest.approx(table.lightness().max(), abs=1e-3)
     assert light[0] <= oklab(table.paper)[0] + 1e-3
 
 
-def test_tones_above_the_knee_are_kept():
+def test_a_light_hand_on_dark_paper_leaves_the_darks():
+    """Though none of its crayons comes near to white."""
+    table = box(np.full(3, 0.012, np.float32))
+    for hardest in (0.1, 0.2, 0.4):
+        light = analysis.tone_map(ramp(), table.upto(hardest), Style(), TIP)[0, :, 0]
+        assert light[0] <= oklab(table.paper)[0] + 0.01 and np.diff(light).min() >= -1e-6
+
+
+def test_tones_above_the_knee_are_kept_without_lift():
     """Only what lies near the darkest crayon or below it is drawn together."""
     table, lab = box(), ramp()
-    light, given = lab[0, :, 0], analysis.tone_map(lab, table, Style())[0, :, 0]
+    light, given = lab[0, :, 0], analysis.tone_map(lab, table, Style(lift=0.0), TIP)[0, :, 0]
     kept = (light > table.lightness().min() + analysis.KNEE) & (light < analysis.WHITE)
     assert kept.sum() > 200 and np.abs(given - light)[kept].max() < 1e-6
     assert (given >= light - 1e-6)[light < table.lightness().min()].all(), (
@@ -132,24 +141,75 @@ def test_tones_above_the_knee_are_kept():
     )
 
 
+def even(low, high, shape=(200, 600)):
+    """Greys whose OKLab L rises evenly from left to right."""
+    lab = np.zeros((*shape, 3), np.float32)
+    lab[..., 0] = np.linspace(low, high, shape[1])
+    return lab
+
+
+def test_with_full_lift_tones_lie_on_one_line_from_the_darkest_crayon_to_the_paper():
+    table, lab = box(), even(0, 1)
+    light, given = (
+        m[100, 30:-30, 0] for m in (lab, analysis.tone_map(lab, table, Style(lift=1.0), TIP))
+    )
+    grey = given < analysis.WHITE
+    slope, rest = np.polyfit(light[grey], given[grey], 1)
+    assert np.abs(slope * light + rest - given)[grey].max() < 2e-3
+    assert rest == pytest.approx(table.lightness().min(), abs=0.01)
+    assert 0.98 * slope + rest == pytest.approx(oklab(table.paper)[0], abs=0.01)
+
+
+def test_lift_is_the_share_of_that_line():
+    none, half, all_ = (
+        analysis.tone_map(even(0, 1), box(), Style(lift=lift), TIP)[100, :, 0]
+        for lift in (0.0, 0.5, 1.0)
+    )
+    dark = all_ < analysis.WHITE - 0.05
+    assert np.abs(half - (none + all_) / 2)[dark].max() < 5e-3
+    assert (all_ - none)[100:200].min() > 0.05, "darks are drawn lighter"
+
+
+@pytest.mark.parametrize("lift", [0.5, 1.0])
+def test_what_is_finer_than_a_few_tips_keeps_its_contrast(lift):
+    """Stripes a tip wide on a ramp whose own contrast shrinks."""
+    lab = even(0, 1)
+    stripes = 0.02 * np.sign(np.sin(np.arange(200) * np.pi / TIP + 0.1))[:, None]
+    striped = lab.copy()
+    striped[..., 0] += stripes
+    plain, given = (analysis.tone_map(m, box(), Style(lift=lift), TIP)[..., 0]
+                    for m in (lab, striped))  # fmt: skip
+    broad = plain[100, 350] - plain[100, 200]
+    assert broad < (1 - 0.2 * lift) * (lab[100, 350, 0] - lab[100, 200, 0])
+    left = np.median(np.abs(given - plain)[50:-50, 200:350]) / 0.02
+    assert left > 0.95, "of the stripes' contrast"
+
+
+@pytest.mark.parametrize("low, high", [(0.9, 1), (0.99, 0.99), (0.6, 1), (1, 1)])
+def test_what_is_light_stays_light(low, high):
+    lab = even(low, high)
+    given = analysis.tone_map(lab, box(), Style(lift=1.0), TIP)[..., 0]
+    assert (given >= np.minimum(lab[..., 0], oklab(PAPER)[0]) - 0.01).all()
+
+
 def test_what_is_nearly_white_and_grey_becomes_paper_and_what_has_colour_does_not():
     pale = np.tile(np.array([0.95, 0.0, 0.0], np.float32), (1, 2, 1))
     pale[0, 1, 2] = 0.15
-    grey, yellow = analysis.tone_map(pale, box(), Style())[0, :, 0]
+    grey, yellow = analysis.tone_map(pale, box(), Style(), TIP)[0, :, 0]
     assert grey > 0.97 > yellow == pytest.approx(0.95, abs=0.001)
 
 
 def test_a_photo_within_reach_keeps_its_tones():
     lab = ramp(0.1, 0.5)
-    assert np.allclose(analysis.tone_map(lab, box(), Style())[..., 0], lab[..., 0], atol=1e-6)
+    assert np.allclose(analysis.tone_map(lab, box(), Style(), TIP)[..., 0], lab[..., 0], atol=1e-6)
 
 
 def test_hue_is_kept_and_chroma_follows_the_style():
     lab = oklab(clouds(4) * 0.6 + 0.1)
-    plain, rich = (analysis.tone_map(lab, box(), Style(chroma=c, skin=0)) for c in (1.0, 1.5))
+    plain, rich = (analysis.tone_map(lab, box(), Style(chroma=c, skin=0), TIP) for c in (1.0, 1.5))
     assert np.allclose(plain[..., 1:], lab[..., 1:], atol=1e-5)
     assert np.allclose(rich[..., 1:], 1.5 * lab[..., 1:], atol=1e-5)
-    skin = analysis.tone_map(lab, box(), Style(skin=1.0))
+    skin = analysis.tone_map(lab, box(), Style(skin=1.0), TIP)
     assert (
         np.hypot(*np.moveaxis(skin[..., 1:], 2, 0))
         >= np.hypot(*np.moveaxis(lab[..., 1:], 2, 0)) - 1e-6

@@ -169,6 +169,28 @@ def test_silhouettes_come_first():
         assert lines and all((s.path_mm[:, 0].max() < 100) == left for s in lines)
 
 
+@pytest.mark.parametrize("radius, inner", [(28, False), (60, True)])
+def test_no_line_is_drawn_inside_a_small_subject(radius, inner):
+    """Its silhouette has its line all the same."""
+    y, x = np.mgrid[:300, :400] / 2
+    photo = np.full((300, 400, 3), 0.7, np.float32)
+    off = np.hypot(x - CENTRE[0], y - CENTRE[1])
+    photo[off < radius] = 0.3
+    photo[off < 14] = 0.02
+    cells = analysis.work_shape(WIDTH, HEIGHT)
+    y, x = np.mgrid[: cells[0], : cells[1]] * (WIDTH / cells[1])
+    mask = (np.hypot(x - CENTRE[0], y - CENTRE[1]) < radius).astype(np.float32)
+    lines = outlines(photo, steady(), mask=mask)
+    far = [np.linalg.norm(s.path_mm - CENTRE, axis=1).mean() for s in lines]
+    assert any(abs(d - radius) < 3 for d in far), "the silhouette"
+    assert any(d < radius - 8 for d in far) == inner
+
+
+@pytest.mark.parametrize("hardest", [0.1, 0.2, 0.4])
+def test_the_lightest_hand_draws_lines(hardest):
+    assert outlines(disc(), steady(hardest=hardest))
+
+
 @pytest.mark.parametrize("style", ["artist", "sketch", "fine", "solid", "child"])
 def test_lines_stay_inside_the_margin(style):
     photo = (

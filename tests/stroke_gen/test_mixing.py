@@ -12,7 +12,7 @@ from fake_box import COLOURS, box
 
 from stroke_gen import mixing
 from stroke_gen.colour import oklab
-from stroke_gen.mixing import LAYERS, Mixtures, clash, find, foreign, greyness
+from stroke_gen.mixing import LAYERS, Mixtures, chord, clash, find, foreign, greyness
 from stroke_gen.swatches import Swatches
 
 TABLE = box()
@@ -45,12 +45,15 @@ def swatch(name, pressure=3, table=TABLE, ground=None):
     return table.over(table.paper if ground is None else ground)[table.names.index(name), pressure]
 
 
-def scene_of(*colours, skin=(), hair=()):
-    """Flat patches of linear colours side by side, each a family of its own."""
+def scene_of(*colours, skin=(), hair=(), cared=()):
+    """Flat patches of linear colours side by side, each a family of its own; `cared` for some."""
     family = np.arange(len(colours), dtype=np.int32).repeat(SIZE)[None].repeat(SIZE, 0)
     lab = oklab(np.array(colours, np.float32))[family]
-    of = [np.isin(family, chosen).astype(np.float32) for chosen in (skin, hair)]
-    return SimpleNamespace(guide=SimpleNamespace(lab=lab), family=family, skin=of[0], hair=of[1])
+    maps = {
+        name: np.isin(family, chosen).astype(np.float32)
+        for name, chosen in (("skin", skin), ("hair", hair), ("care", cared))
+    }
+    return SimpleNamespace(guide=SimpleNamespace(lab=lab), family=family, **maps)
 
 
 def found(*colours, table=TABLE, most=9, seed=0, **body):
@@ -82,7 +85,7 @@ def slow_combine(ground, crayons, choice, table):
 @pytest.mark.parametrize("ground", [TABLE.paper, (0.9, 0.7, 0.2), (0.1, 0.2, 0.05)])
 def test_combine_is_its_slow_twin(names, ground):
     crayons = np.array([NAMES.index(n) for n in names])
-    levels = FULL if len(names) < 3 else mixing.FEW[:4]
+    levels = FULL if len(names) < 3 else mixing.few(len(FULL) - 1)[:4]
     choices = list(product(levels, repeat=len(names)))
     colour, price = np.empty((len(choices), 3), np.float32), np.empty(len(choices), np.float32)
     mixing.combine(np.array(ground, np.float32), crayons, levels, mixing.wax(TABLE), colour, price)
@@ -132,7 +135,7 @@ def prices_of(scene, table, seed=0):
     """Samples, and prices of crayons, as `find` takes them for patches that are neither skin nor
     hair.
     """
-    sample, _ = mixing._samples(scene.guide.lab, scene.family, np.random.default_rng(seed))
+    sample = mixing._samples(scene.guide.lab, scene.family, np.random.default_rng(seed))
     return sample, mixing.prices(sample, table) + mixing.LAYER_PRICE
 
 
@@ -163,8 +166,8 @@ def test_one_crayon_serves_a_colour_that_the_box_holds(name, pressure):
 
 def test_two_crayons_mix_what_the_box_does_not_hold():
     two = table_of("blue", "yellow")
-    green = swatch("blue", 2, two, swatch("yellow", 4, two))
-    assert found(green, table=two) == [["yellow", "blue"]]
+    olive = swatch("blue", 3, two, swatch("yellow", 4, two))
+    assert found(olive, table=two) == [["yellow", "blue"]]
 
 
 def test_bare_paper_takes_no_dark_crayon():
@@ -197,6 +200,22 @@ def test_of_few_crayons_the_least_missed_are_left():
         scene_of(red, red, red, blue, blue, green), TABLE, 2, np.random.default_rng(0)
     ).crayons()
     assert {NAMES[k] for k in used} == {"red", "blue"}
+
+
+def test_where_care_is_due_a_surface_has_the_larger_say():
+    """Two patches of red ground and one subject of green: with one crayon it is the subject's."""
+    red, green = (swatch(n, 4) for n in ("red", "green"))
+    for cared, left in (((), "red"), ((2,), "green")):
+        scene = scene_of(red, red, green, cared=cared)
+        used = find(scene, TABLE, 1, np.random.default_rng(0)).crayons()
+        assert [NAMES[k] for k in used] == [left]
+
+
+def test_pressures_tried_with_four_crayons_go_from_none_to_the_hardest():
+    for number in range(1, 9):
+        some = mixing.few(number)
+        assert some[0] == 0 and some[-1] == number and len(some) == min(number + 1, 5)
+        assert np.diff(some).min() > 0
 
 
 def test_every_tone_of_a_surface_counts():
@@ -241,10 +260,49 @@ def taken(monkeypatch, name, value, colour, table):
 
 def test_a_hue_that_opposes_the_surface_has_its_price(monkeypatch):
     """Red under green fits this olive exactly; whether it is taken is a matter of the price."""
+    monkeypatch.setattr(mixing, "HUE_PRICE", 0.0)
     table = table_of("red", "green", "black")
     olive = swatch("green", 4, table, swatch("red", 1, table))
     assert "red" in taken(monkeypatch, "OPPOSED_PRICE", 0.0, olive, table)
     assert "red" not in taken(monkeypatch, "OPPOSED_PRICE", 5.0, olive, table)
+
+
+def test_another_hue_has_its_price_where_the_box_has_a_crayon_of_the_hue(monkeypatch):
+    """Yellow and sky fit this green exactly, as the price of opposed hues lets them."""
+    monkeypatch.setattr(mixing, "OPPOSED_PRICE", 0.0)
+    monkeypatch.setattr(mixing, "LOUD_PRICE", 0.0)
+    fresh = {**with_greys(), "sky": (0.02, 0.6, 0.5), "green": (0.3, 0.7, 0.05)}
+    few, more = (table_of("yellow", "sky", *green, colours=fresh) for green in ([], ["green"]))
+    mixed = swatch("sky", 3, few, swatch("yellow", 4, few))
+    assert taken(monkeypatch, "HUE_PRICE", 0.0, mixed, more) >= {"yellow", "sky"}
+    assert taken(monkeypatch, "HUE_PRICE", 5.0, mixed, more) == {"green"}
+    assert taken(monkeypatch, "HUE_PRICE", 5.0, mixed, few) == {"yellow", "sky"}
+
+
+def test_bodies_have_their_own_prices_of_hue(monkeypatch):
+    """As far as hue goes, skin and hair may be turned; what is foreign to them is priced apart."""
+    monkeypatch.setattr(mixing, "BODY_PRICE", np.float32(0))
+    monkeypatch.setattr(mixing, "OPPOSED_PRICE", 0.0)
+    monkeypatch.setattr(mixing, "LOUD_PRICE", 0.0)
+    table = table_of("yellow", "pink", "tan")
+    mixed = swatch("pink", 3, table, swatch("yellow", 4, table))
+    monkeypatch.setattr(mixing, "HUE_PRICE", 5.0)
+    assert found(mixed, table=table) == [["tan"]]
+    for body in ("skin", "hair"):
+        assert set(found(mixed, table=table, **{body: [0]})[0]) >= {"yellow", "pink"}
+
+
+def test_a_hue_of_some_of_the_surface_is_its_own(monkeypatch):
+    table = table_of("yellow", "blue", "black")
+    for some, dear in ((2, True), (10, False)):
+        patches = np.array([swatch("yellow", 4)] * (24 - some) + [swatch("blue", 4)] * some)
+        sample = oklab(patches).T[None].copy()
+        prices = []
+        for price in (0.0, 1.0):
+            monkeypatch.setattr(mixing, "HUE_PRICE", price)
+            prices.append(mixing.prices(sample, table)[0])
+        yellow, blue, black = prices[1] - prices[0]
+        assert (blue > 0.1) == dear and max(yellow, black) < 0.05
 
 
 def test_grey_in_a_colour_has_its_price(monkeypatch):
@@ -269,7 +327,7 @@ def test_a_loud_crayon_in_a_quiet_surface_has_its_price(monkeypatch):
 def test_black_in_the_light_has_its_price(monkeypatch):
     table = table_of("black")
     table = replace(table, grain=0 * table.grain)
-    sample, _ = mixing._samples(
+    sample = mixing._samples(
         oklab(np.full((9, 9, 3), 0.8, np.float32)),
         np.zeros((9, 9), np.int32),
         np.random.default_rng(0),
@@ -319,6 +377,13 @@ def test_opposing_hues_clash():
     assert clash(red, green) == pytest.approx(clash(green, red))
 
 
+def test_how_far_apart_two_hues_are_is_their_angle_s_chord():
+    angle = np.deg2rad(np.arange(0, 181, 5))
+    chords = chord(np.array([0.2, 0.0]), 0.2 * np.stack([np.cos(angle), np.sin(angle)], 1))
+    assert np.allclose(chords, 0.4 * np.sin(angle / 2), atol=1e-6)
+    assert chord(np.array([0.2, 0.0]), np.zeros(2)) == 0, "grey is of any hue"
+
+
 def test_near_hues_do_not_clash_and_the_farther_apart_others_are_the_more_they_do():
     angle = np.deg2rad(np.arange(0, 181, 5))
     clashes = clash(np.array([0.2, 0.0]), 0.1 * np.stack([np.cos(angle), np.sin(angle)], 1))
@@ -357,9 +422,8 @@ def test_a_single_crayon_and_a_box_of_a_hundred():
     )
 
 
-def test_samples_are_of_each_surface_and_sizes_its_shares():
+def test_samples_are_of_each_surface():
     family = np.random.default_rng(6).integers(0, 5, (40, 50)).astype(np.int32)
     lab = np.stack([family.astype(np.float32)] * 3, 2)
-    sample, size = mixing._samples(lab, family, np.random.default_rng(0))
+    sample = mixing._samples(lab, family, np.random.default_rng(0))
     assert all((sample[g] == g).all() for g in range(5)) and sample.shape == (5, 3, mixing.SAMPLES)
-    assert np.allclose(size, np.bincount(family.ravel()) / family.size)

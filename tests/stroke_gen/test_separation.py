@@ -30,7 +30,8 @@ def plan_for(photo, family=None, table=TABLE, threads=2, layers=None):
     if layers is None:
         return plan_of(scene, POOLS[threads], table)
     rows = [[table.names.index(n) for n in row] + [-1] * (LAYERS - len(row)) for row in layers]
-    return Plan(scene, table, Mixtures(np.array(rows)), POOLS[threads])
+    every = list(range(len(table.names)))
+    return Plan(scene, every, table, Mixtures(np.array(rows)), POOLS[threads])
 
 
 def wanted(plan, now=None, turn=0, dark_price=0.3):
@@ -230,7 +231,11 @@ def test_plates_are_the_same_with_any_number_of_threads(turn):
         np.random.default_rng(2).random((129, 81, 3)).astype(np.float32), (0, 0), 3
     )
     family = np.random.default_rng(3).integers(0, 5, (43, 27)).repeat(3, 0).repeat(3, 1)
-    first, *others = (wanted(plan_for(photo, family, threads=n), turn=turn) for n in POOLS)
+    layers = [["yellow", "blue"], ["pink", "green"], ["sky", "brown"], ["white", "red", "black"],
+              ["yellow", "sky", "green", "black"]]  # fmt: skip
+    first, *others = (
+        wanted(plan_for(photo, family, threads=n, layers=layers), turn=turn) for n in POOLS
+    )
     for other in others:
         assert (
             first

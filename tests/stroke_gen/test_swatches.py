@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from fake_box import COLOURS, PAPER, box
 
+from stroke_gen.colour import oklab
 from stroke_gen.swatches import COVERED, TIP_MM, covered, firmness
 
 TABLE = box()
@@ -62,6 +63,25 @@ def test_the_table_of_some():
         some.grain == TABLE.grain[[7, 2]]
     ).all()
     assert (some.lightness() == TABLE.lightness()[[7, 2]]).all()
+
+
+@pytest.mark.parametrize("hardest, left", [(0.01, 2), (0.1, 2), (0.38, 4), (0.4, 4), (2.0, 6)])
+def test_a_hand_that_presses_no_harder_has_the_beginning_of_the_table(hardest, left):
+    """And two pressures at least, between which tones can lie."""
+    some = TABLE.upto(hardest)
+    assert some.names == TABLE.names and (some.paper == TABLE.paper).all()
+    assert some.pressures.tolist() == TABLE.pressures[:left].tolist()
+    assert (some.over(PAPER) == TABLE.over(PAPER)[:, :left]).all()
+    assert (some.grain == TABLE.grain[:, :left]).all()
+    assert all(m.flags.c_contiguous for m in (some.a, some.b, some.grain)), "as kernels take them"
+
+
+def test_masstone_is_the_colour_of_a_firm_hand_however_far_the_table_goes():
+    firm = oklab(TABLE.over(PAPER))[:, TABLE.pressures.tolist().index(np.float32(0.38))]
+    for hardest in (0.38, 0.62, 2.0):
+        assert np.allclose(TABLE.upto(hardest).masstone(), firm, atol=1e-6)
+    light = TABLE.upto(0.1)
+    assert np.allclose(light.masstone(), oklab(light.over(PAPER))[:, -1], atol=1e-6)
 
 
 def test_a_finer_tip_is_pressed_harder():

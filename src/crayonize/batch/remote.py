@@ -59,7 +59,7 @@ def file_system(url: str) -> tuple[Any, str]:
     try:
         import fsspec
     except ImportError as error:
-        raise ImportError(f'{url}: remote folders need pip install "crayonize[remote]"') from error
+        raise ImportError(f'{url}: remote folders need pip install fsspec') from error
     system, path = fsspec.core.url_to_fs(url)
     return system, str(path)
 

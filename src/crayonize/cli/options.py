@@ -128,6 +128,8 @@ def photo_parser() -> Parser:
     )
     add("--focus", type=_focus, action="append", default=[], metavar="X,Y,W,H",
         help="a part that deserves care, in fractions of the picture; may be repeated")  # fmt: skip
+    add("--subject", default=Settings.subject, metavar="WHO",
+        help="what is drawn with most care: auto, none, or a picture of it, white on black (auto)")
     add("--sheet", dest="sheet_mm", type=_sheet, default=Settings.sheet_mm, metavar="SIZE",
         help="long side of the sheet: a5, a4, 180mm; strokes keep their width (a5)")  # fmt: skip
     add("--print", choices=page.PAGES, help="fill a page of this size")
