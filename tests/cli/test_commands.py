@@ -14,6 +14,7 @@ import pytest
 
 from crayonize import api, cli
 from crayonize.cli import bar
+from crayonize.cli.options import photo_parser
 from crayonize.images.read import read_linear
 from crayonize.images.write import read_settings
 from crayonize.machine import memory
@@ -235,6 +236,12 @@ def test_a_closed_stream_is_no_file_of_ours(tmp_path):
     assert subprocess.run(["sh", "-c", line], cwd=tmp_path).returncode == 0
 
 
+@pytest.mark.parametrize("words", [["--print", "A4"], ["--sheet", "A4"], ["--sheet", "200MM"]])
+def test_pages_may_be_written_in_capitals(words):
+    read = photo_parser().read(["photo.jpg", *words])
+    assert read.print == "a4" or read.sheet_mm in (297.0, 200.0)
+
+
 def test_a_name_that_begins_with_a_dash(photo, run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "-dash.jpg").write_bytes(photo.read_bytes())
@@ -418,6 +425,7 @@ SLEEPER = """
 import sys, time
 from crayonize import __main__, api
 from crayonize.cli import bar
+from crayonize.cli.options import photo_parser
 def sketch(*_):
     print("ready", flush=True)
     time.sleep(60)
