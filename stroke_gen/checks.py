@@ -38,12 +38,15 @@ def is_number(value: Any) -> bool:
 
 
 def whole(value: Any, low: int, high: int, where: str, most: str = "") -> int:
-    """A whole number from low to high; most: how to write `high` in the message."""
-    if type(value) is not int or not low <= value <= high:
+    """A whole number, Python's or numpy's, from low to high; most: how to write `high` in the
+    message.
+    """
+    right = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    if not right or not low <= int(value) <= high:
         raise ValueError(
             f"{where}: {shown(value)} is not a whole number from {low} to {most or high}"
         )
-    return value
+    return int(value)
 
 
 def text(value: Any, longest: int, where: str, shortest: int = 0) -> str:

@@ -65,6 +65,8 @@ _DRAWING_KEYS = (
 _STROKE_KEYS = ("crayon", "path", "force", "tip", "note", "tilt")
 _TIP_KEYS = ("kind", "width_mm", "angle_deg")
 _CHUNK = 2**20
+# of a text that may be a drawing: lists (points) and quotation marks to a stroke, and beside them
+_LISTS_EACH, _QUOTES_EACH, _FREE = 5000, 40, 1_000_000
 _DECIMALS = 3  # a micrometre, a thousandth of a newton
 _NO_FORCE = -math.inf  # stands where a point among [x, y, force] points has no force of its own
 
@@ -97,7 +99,21 @@ def _read(stream: TextIO, where: str) -> Drawing:
                 raise ValueError(f"{where}: longer than {MAX_CHARS:,} characters")
     except UnicodeDecodeError as error:
         raise ValueError(f"{where}: not UTF-8 text") from error
-    return drawing_from_json(checks.parsed_json("".join(parts), where, "drawing", _packed), where)
+    content = "".join(parts)
+    _check_likely(content, where)
+    return drawing_from_json(checks.parsed_json(content, where, "drawing", _packed), where)
+
+
+def _check_likely(content: str, where: str) -> None:
+    """Refuse text that would fill the memory before it turns out to be no drawing: each of its
+    values takes thirty times as much as its letters.
+    """
+    objects = content.count("{")
+    checks.count("objects", objects, 2 * MAX_STROKES + 10, where)
+    for what, sign, each in (("lists", "[", _LISTS_EACH), ("texts", '"', _QUOTES_EACH)):
+        number = content.count(sign)
+        if number > _FREE + each * objects:
+            raise ValueError(f"{where}: {number:,} {what} in {objects:,} strokes: no drawing")
 
 
 def _packed(made: dict[str, Any]) -> dict[str, Any]:

@@ -3,14 +3,22 @@ none.
 """
 
 import errno
+import functools
+import hashlib
 import os
 import secrets
+import socket
 import stat
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO, Literal
 
-PART = ".crayonize-"  # begins the name of a file that is not yet whole; the process number follows
+# A file that is not yet whole is called PART, process number, machine, chance, ".part".
+PART = ".crayonize-"
+_parts: set[Path] = set()  # being written now
+_STALE = 3600.0  # s after which one of another machine is taken for left behind
 
 
 @contextmanager
@@ -26,7 +34,9 @@ def whole_file(path: str | os.PathLike[str], durable: bool = True) -> Iterator[P
     """
     target = Path(os.fsdecode(path))
     check_target(target)
-    part = target.with_name(f"{PART}{os.getpid()}-{secrets.token_hex(4)}.part{target.suffix}")
+    name = f"{PART}{os.getpid()}-{_machine()}-{secrets.token_hex(4)}.part{target.suffix}"
+    part = target.with_name(name)
+    _parts.add(part)
     try:
         try:
             yield part
@@ -41,6 +51,60 @@ def whole_file(path: str | os.PathLike[str], durable: bool = True) -> Iterator[P
             raise
     except OSError as error:
         raise OSError(error.errno, error.strerror or str(error), os.fspath(target)) from error
+    finally:
+        _parts.discard(part)
+
+
+def drop_parts() -> None:
+    """Remove all that this process has half written, at its sudden end."""
+    for part in list(_parts):
+        with suppress(OSError):
+            part.unlink()
+
+
+def sweep(folder: str | os.PathLike[str], pid: int | None = None) -> None:
+    """Remove what killed processes left half written in a folder; the living keep theirs.
+
+    pid: only what this process left, which is known to be dead.
+    """
+    with suppress(OSError), os.scandir(folder) as listing:
+        for entry in listing:
+            words = entry.name.removeprefix(PART).split("-")
+            if entry.name.startswith(PART) and ".part" in entry.name and words[0].isdigit():
+                owner = int(words[0])
+                with suppress(OSError):
+                    if owner == pid if pid is not None else _is_left(entry, owner, words[1]):
+                        os.unlink(entry.path)
+
+
+def _is_left(entry: os.DirEntry[str], owner: int, machine: str) -> bool:
+    if machine == _machine() and os.name != "nt":
+        return not is_alive(owner)
+    return time.time() - entry.stat(follow_symlinks=False).st_mtime > _STALE
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process of this machine is there, and not one that is dead but still listed."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # somebody else's
+        return True
+    with suppress(OSError, IndexError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    return True
+
+
+@functools.cache
+def _machine() -> str:
+    """Names what process numbers belong to: the machine since its start, or a container on it."""
+    told = socket.gethostname()
+    with suppress(OSError):
+        told += Path("/proc/sys/kernel/random/boot_id").read_text() + os.readlink(
+            "/proc/self/ns/pid"
+        )
+    return hashlib.sha256(told.encode()).hexdigest()[:8]
 
 
 def _sync(path: Path, flags: int) -> None:
@@ -72,6 +136,28 @@ def check_target(path: str | os.PathLike[str]) -> None:
             raise ValueError(
                 f"{str(target)!r}: stands for a folder or device; give the name of a file"
             )
+
+
+@contextmanager
+def own_file(path: str | os.PathLike[str], mode: Literal["rb", "a+b"]) -> Iterator[IO[bytes]]:
+    """A file that we keep beside other people's, to be read, or made if need be and added to.
+
+    OSError naming it if it is anything else: through a link we would write into a photo, a pipe
+    would wait for ever, a device has no end.
+    """
+    name = os.fspath(path)
+    flags = os.O_RDONLY if mode == "rb" else os.O_RDWR | os.O_CREAT | os.O_APPEND
+    for more in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):
+        flags |= getattr(os, more, 0)
+    if os.path.islink(path):
+        raise OSError(errno.ELOOP, "is a link; remove it", name)
+    handle = os.open(path, flags, 0o666)
+    found = os.fstat(handle)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        os.close(handle)
+        raise OSError(errno.EINVAL, "is no plain file of our own; remove it", name)
+    with open(handle, mode, buffering=0 if mode == "a+b" else -1) as file:
+        yield file
 
 
 def read_bytes(path: str | os.PathLike[str], most: int, what: str) -> bytes:

@@ -1,7 +1,9 @@
 """The Python interface: what goes in comes out, the same drawing by every way."""
 
+import io
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +15,7 @@ import crayonize
 from crayonize import api
 from crayonize.images.read import read_linear
 from crayonize.machine import memory
+from crayonize.settings import Choices, Settings
 from stroke_gen.drawing import Drawing, Stroke, Tip
 from stroke_gen.drawing_file import load_drawing
 
@@ -28,6 +31,41 @@ def photo():
 @pytest.fixture(scope="module")
 def picture(photo):
     return crayonize.convert(photo, **CHOICES)
+
+
+def test_bytes_and_open_files_come_back_as_png(photo, picture):
+    file = io.BytesIO()
+    Image.fromarray(photo).save(file, "PNG")
+    made = crayonize.convert(file.getvalue(), **CHOICES)
+    assert isinstance(made, bytes) and made.startswith(b"\x89PNG")
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(made))), picture)
+    file.seek(0)
+    odd = {"size": np.int64(120), "seed": np.int64(3), "paper": Path("drawing")}
+    again = crayonize.convert(file, **CHOICES | odd)
+    assert isinstance(again, io.BytesIO) and again.read() == made
+    with pytest.raises(ValueError, match="bytes: "):
+        crayonize.convert(b"no picture")
+
+
+def test_a_picture_is_written_into_what_is_open(photo, picture):
+    into = io.BytesIO()
+    assert np.array_equal(crayonize.convert(photo, into, **CHOICES), picture)
+    into.seek(0)
+    assert np.array_equal(np.asarray(Image.open(into)), picture)
+
+
+def test_choices_are_the_fields_of_settings():
+    assert list(Choices.__annotations__) == [field.name for field in fields(Settings)]
+    assert (Path(api.__file__).parent / "py.typed").exists()
+
+
+def test_a_cancelled_drawing_writes_nothing(photo, tmp_path):
+    def cancel(name, share):
+        raise RuntimeError("cancelled")
+
+    with pytest.raises(RuntimeError, match="cancelled"):
+        crayonize.convert(photo, tmp_path / "out.png", **CHOICES, progress=cancel)
+    assert not list(tmp_path.iterdir())
 
 
 def test_array_gives_array(picture):

@@ -7,7 +7,7 @@ import pytest
 
 import crayonize
 import stroke_gen
-from crayonize import cli
+from crayonize.__main__ import main
 from crayonize.crayons.palette_files import load_palette, palette_names
 from crayonize.wax.paper import load_paper, papers
 from stroke_gen.params import load_style, style_names
@@ -48,7 +48,7 @@ def test_version_is_that_of_the_package():
 def test_command_is_installed():
     (command,) = installed().entry_points.select(group="console_scripts")
     assert command.name == "crayonize"
-    assert command.load() is cli.main
+    assert command.load() is main
 
 
 def test_only_our_two_packages_are_installed():

@@ -12,15 +12,16 @@ import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, Unpack, overload
 
 from stroke_gen import checks
 from stroke_gen.checks import did_you_mean, quoted
 
 from . import __version__
 from .machine import kernels, memory
-from .settings import Settings
+from .settings import Choices, Settings
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from .pipeline import Easel, Onlooker, Progress
 
 
+Target = str | os.PathLike[str] | BinaryIO  # where a picture goes
 MAX_SEED = 2**63 - 1
 MAX_SIZE = 20_000  # pixels along the long side
 MAX_THREADS = 256
@@ -44,9 +46,37 @@ STROKE_SUFFIXES = (".json", ".svg")
 _MM_PER_INCH = 25.4
 
 
+class _Options(Choices, total=False):
+    strokes: str | os.PathLike[str] | None
+    timelapse: str | os.PathLike[str] | None
+    seconds: float
+    show_tip: bool
+    legend: bool
+    light: bool
+    progress: Progress | None
+
+
+@overload
 def convert(
-    image: Source,
-    out: str | os.PathLike[str] | None = None,
+    image: NDArray[Any], out: Target | None = None, **options: Unpack[_Options]
+) -> NDArray[np.uint8]: ...
+@overload
+def convert(image: Image, out: Target | None = None, **options: Unpack[_Options]) -> Image: ...
+@overload
+def convert(image: bytes, out: Target | None = None, **options: Unpack[_Options]) -> bytes: ...
+@overload
+def convert(image: BinaryIO, out: None = None, **options: Unpack[_Options]) -> BytesIO: ...
+@overload
+def convert(
+    image: str | os.PathLike[str], out: None = None, **options: Unpack[_Options]
+) -> Image: ...
+@overload
+def convert(
+    image: str | os.PathLike[str], out: str | os.PathLike[str], **options: Unpack[_Options]
+) -> Path: ...
+def convert(
+    image: Source | BinaryIO,
+    out: Target | None = None,
     *,
     strokes: str | os.PathLike[str] | None = None,
     timelapse: str | os.PathLike[str] | None = None,
@@ -55,15 +85,16 @@ def convert(
     legend: bool = False,
     light: bool = True,
     progress: Progress | None = None,
-    **choices: Any,
-) -> Image | NDArray[np.uint8] | Path:
+    **choices: Unpack[Choices],
+) -> Image | NDArray[np.uint8] | Path | bytes | BytesIO:
     """Draw a photo with wax crayons.
 
     Parameters
     ----------
-    image: a path, a Pillow image, or an array (h, w), (h, w, 3) or (h, w, 4) of uint8, uint16 or
-        sRGB-encoded floats 0..1.
-    out: where to write the drawing (PNG, JPEG, WebP or TIFF), with settings and seed inside.
+    image: a path, a Pillow image, an array (h, w), (h, w, 3) or (h, w, 4) of uint8, uint16 or
+        sRGB-encoded floats 0..1, or a photo's file as bytes or opened for reading.
+    out: where to write the drawing (PNG, JPEG, WebP or TIFF), with settings and seed inside; what
+        is open for writing gets a PNG.
     strokes: where to save the strokes: .json, from which `draw` makes the same picture at any
         size, or .svg for other programs.
     timelapse: where to write a film of the drawing (.webp, .gif, .png, .mp4).
@@ -71,13 +102,15 @@ def convert(
     show_tip: with the crayon in the film.
     legend: put the crayons used beside the picture.
     light: shade the relief of paper and wax.
-    progress: called with the name of what is being done and the share done, 0..1.
+    progress: called with the name of what is being done and the share done, 0..1. Raise an
+        exception in it to cancel: nothing is written, and the exception comes out here.
     **choices: any field of `Settings` (palette, paper, style, force, size, seed, ...).
 
     Returns
     -------
     The same kind as `image`: for an array uint8 sRGB (h, w, 3), for a Pillow image one, for a path
-    the path `out`, or a Pillow image if there is no `out`.
+    the path `out`, or a Pillow image if there is no `out`; for bytes or an open file a PNG, as
+    bytes or as a BytesIO.
 
     Raises
     ------
@@ -95,14 +128,21 @@ def convert(
     import numpy as np
     from PIL import Image
 
-    settings = settings_of(choices)
+    settings = settings_of(dict(choices))
+    opened = hasattr(image, "read")
+    given: Source = image.read() if opened else image  # type: ignore[union-attr,assignment]
+    if isinstance(given, bytes) and out is None:
+        out = BytesIO()
     check_outputs([image, *settings.files()], out, strokes, timelapse)
     with filming(timelapse, seconds, show_tip, light) as watch:
-        drawn = sketch(image, settings, progress, watch)
+        drawn = sketch(given, settings, progress, watch)
     picture = finish(*drawn, out, strokes, light=light, settings=settings, legend=legend)
     if isinstance(image, np.ndarray):
         return picture
-    if out is not None and not isinstance(image, Image.Image):
+    if isinstance(given, bytes) and isinstance(out, BytesIO):
+        out.seek(0)
+        return out if opened else out.getvalue()
+    if isinstance(out, str | os.PathLike) and not isinstance(image, Image.Image):
         return Path(out)
     return Image.fromarray(picture)
 
@@ -159,7 +199,7 @@ def settings_of(choices: dict[str, Any]) -> Settings:
     for name in choices:
         if name not in known:
             raise TypeError(f"there is no choice {quoted(name)}{did_you_mean(name, known)}")
-    settings = Settings(**choices)
+    settings = Settings(**{name: _plain(value) for name, value in choices.items()})
     checks.whole(settings.size, 1, MAX_SIZE, "size")
     checks.whole(settings.seed, 0, MAX_SEED, "seed", "2^63 - 1")
     _check_threads(settings.threads)
@@ -171,6 +211,13 @@ def settings_of(choices: dict[str, Any]) -> Settings:
     return settings.parsed()
 
 
+def _plain(value: Any) -> Any:
+    """numpy's numbers as Python's, and paths as text, so that they can be told in a file."""
+    if isinstance(value, os.PathLike):
+        return os.fsdecode(value)
+    return value.item() if getattr(value, "shape", None) == () else value
+
+
 def _check_threads(threads: int | None) -> None:
     if threads is not None:
         checks.whole(threads, 1, MAX_THREADS, "threads")
@@ -178,7 +225,7 @@ def _check_threads(threads: int | None) -> None:
 
 def check_outputs(
     inputs: list[Any],
-    out: str | os.PathLike[str] | None,
+    out: Target | None,
     strokes: str | os.PathLike[str] | None = None,
     timelapse: str | os.PathLike[str] | None = None,
 ) -> None:
@@ -187,15 +234,17 @@ def check_outputs(
     ValueError for what is wrong with a path, PermissionError for a folder that may not be written
     to.
     """
+    from stroke_gen.files import check_target, sweep
+
     from .images.write import file_format, same_file
 
-    if out is not None:
+    if isinstance(out, str | os.PathLike):
         file_format(out)
     if strokes is not None and Path(strokes).suffix.lower() not in STROKE_SUFFIXES:
         raise ValueError(f"{strokes}: strokes can be saved as {', '.join(STROKE_SUFFIXES)} only")
     taken = [path for path in inputs if isinstance(path, str | os.PathLike)]
     for output in (out, strokes, timelapse):
-        if output is None:
+        if not isinstance(output, str | os.PathLike):
             continue
         for path in taken:
             if same_file(path, output):
@@ -207,6 +256,8 @@ def check_outputs(
             raise ValueError(f"{output}: the folder {folder} does not exist; create it first")
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(13, "its folder may not be written to", os.fspath(output))
+        check_target(output)
+        sweep(folder)
         taken.append(output)
 
 
@@ -275,7 +326,7 @@ def redraw(
     """
     from stroke_gen.drawing import Drawing, check_drawing
 
-    checks.whole(size, 1, MAX_SIZE, "size")
+    size = checks.whole(size, 1, MAX_SIZE, "size")
     _check_threads(threads)
     check_outputs([drawing], out)
     if isinstance(drawing, Drawing):
@@ -312,11 +363,34 @@ def load_strokes(
             path, palette=palette or "box24", paper=paper or "drawing", widths=widths, say=say
         )
     drawing = load_drawing(path)
+    _check_no_files(drawing, os.fsdecode(path), palette, paper)
     if palette is not None:
+        from .crayons.palette_files import is_file
         from .crayons.used import with_palette
 
-        drawing = with_palette(drawing, palette)
+        if isinstance(drawing.palette, str) and is_file(drawing.palette):  # never opened
+            drawing = replace(drawing, palette=palette)
+        else:
+            drawing = with_palette(drawing, palette)
     return replace(drawing, paper=paper or drawing.paper)
+
+
+def _check_no_files(drawing: Drawing, where: str, palette: str | None, paper: str | None) -> None:
+    """ValueError if a drawing names files: it may be a stranger's, and they are ours."""
+    from .crayons.palette_files import is_file, palette_names
+    from .wax.paper import papers, strange
+
+    box = drawing.palette if isinstance(drawing.palette, str) else ""
+    found = {
+        "palette": (box if box and is_file(box) else "", [name for name, *_ in palette_names()]),
+        "paper": (strange(drawing.paper), list(papers())),
+    }
+    for what, (word, known) in found.items():
+        if word and (palette, paper)[what == "paper"] is None:
+            raise ValueError(
+                f"{where}: {what}: {quoted(word)} is none of ours{did_you_mean(word, known)}; a "
+                f"drawing names no files, give one with --{what}"
+            )
 
 
 def save_steps(
@@ -344,7 +418,7 @@ def check_size(
 def finish(
     drawing: Drawing,
     easel: Easel,
-    out: str | os.PathLike[str] | None,
+    out: Target | None,
     strokes: str | os.PathLike[str] | None = None,
     *,
     light: bool,

@@ -15,7 +15,7 @@ from stroke_gen.drawing import Drawing, Stroke
 
 from .crayons import calibration
 from .crayons.palette import Palette
-from .crayons.palette_files import load_palette
+from .crayons.palette_files import load_palette, told
 from .light import optics
 from .machine import cores
 from .settings import Settings
@@ -151,9 +151,8 @@ def sketch(
     photo = fit(photo, work_shape(width_mm, height_mm))
     # a pencil's drawing is planned with finer tips than a crayon's
     style = replace(settings.hand, tip_mm=settings.hand.tip_mm * physics(settings.physics).tip)
-    blank = Drawing(
-        width_mm, height_mm, settings.paper, settings.palette, (), settings.physics, settings.seed
-    )
+    named = settings.paper, told(settings.palette)
+    blank = Drawing(width_mm, height_mm, *named, (), settings.physics, settings.seed)
     stand = easel(
         blank,
         max(1, settings.size // 2) if settings.preview else settings.size,
@@ -185,7 +184,7 @@ def sketch(
         width_mm,
         height_mm,
         settings.paper,
-        settings.palette,
+        blank.palette,
         tuple(strokes),
         settings.physics,
         settings.seed,

@@ -5,10 +5,11 @@ No heavy imports: the command line reads its defaults here.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,6 +32,24 @@ SUBJECTS = "auto", "none"
 MASK_SIDE = 1000  # pixels of the picture of a subject that are looked at
 # What can be drawn with, and its constants in data/physics.toml.
 MEDIA = {"crayon": "metric", "oil-pastel": "oil-pastel", "pencil": "pencil"}
+
+
+class Choices(TypedDict, total=False):
+    """The fields of `Settings` as keywords, for type checkers."""
+
+    palette: str | os.PathLike[str] | dict[str, Any]
+    paper: str | os.PathLike[str] | dict[str, Any]
+    style: str | os.PathLike[str] | dict[str, Any]
+    force: str | float
+    size: int
+    sheet_mm: float
+    seed: int
+    physics: str
+    threads: int | None
+    preview: bool
+    age: int | None
+    left_handed: bool
+    focus: tuple[tuple[float, float, float, float], ...]
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def test_heic_without_its_package_names_what_to_install(desk: Desk) -> None:
     run = desk.start(env={**os.environ, "PYTHONPATH": path})
     assert run.end() == 3
     assert run.status("phone.heic") == "failed" and run.count("ok") == 1
-    assert 'pip install "crayonize[heic]"' in run.said
+    assert 'pip install pi-heif' in run.said
 
 
 def test_limits(desk: Desk) -> None:

@@ -98,19 +98,6 @@ def test_a_damaged_journal_costs_only_its_lines(desk: Desk) -> None:
     assert json.loads(path.read_bytes().split(b"\n")[-2])
 
 
-def test_stale_temporary_files_are_removed(desk: Desk) -> None:
-    desk.fill(3).run()
-    stale = desk.pictures / "1" / ".crayonize-1-0011aabb.part"
-    stale.write_bytes(b"half")
-    young = desk.pictures / "2" / ".crayonize-2-0011aabb.part"
-    young.write_bytes(b"half")
-    os.utime(stale, (time.time() - 7200,) * 2)
-    desk.run("--shard", "1/1")
-    assert not stale.exists() and young.exists(), "other shards may be at work"
-    desk.run()
-    assert not young.exists()
-
-
 @pytest.mark.parametrize("stamp", [0, -(10**9), 2_145_916_800, time.time() + 7200])
 def test_odd_dates_are_only_compared(desk: Desk, stamp: float) -> None:
     desk.fill(2)

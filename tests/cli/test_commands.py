@@ -14,6 +14,7 @@ import pytest
 
 from crayonize import api, cli
 from crayonize.cli import bar
+from crayonize.cli.options import photo_parser
 from crayonize.images.read import read_linear
 from crayonize.images.write import read_settings
 from crayonize.machine import memory
@@ -237,6 +238,12 @@ def test_a_closed_stream_is_no_file_of_ours(tmp_path):
     assert subprocess.run(["sh", "-c", line], cwd=tmp_path).returncode == 0
 
 
+@pytest.mark.parametrize("words", [["--print", "A4"], ["--sheet", "A4"], ["--sheet", "200MM"]])
+def test_pages_may_be_written_in_capitals(words):
+    read = photo_parser().read(["photo.jpg", *words])
+    assert read.print == "a4" or read.sheet_mm in (297.0, 200.0)
+
+
 def test_a_name_that_begins_with_a_dash(photo, run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "-dash.jpg").write_bytes(photo.read_bytes())
@@ -419,18 +426,21 @@ def test_closed_pipe_is_quiet():
 
 SLEEPER = """
 import sys, time
-from crayonize import api, cli
+from crayonize import __main__, api
 from crayonize.cli import bar
+from crayonize.cli.options import photo_parser
 def sketch(*_):
     print("ready", flush=True)
     time.sleep(60)
 api.sketch = sketch
-sys.exit(cli.main(sys.argv[1:]))
+sys.exit(__main__.main())
 """
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-@pytest.mark.parametrize("number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    "number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
 def test_signals_end_it_quietly(photo, tmp_path, number, code):
     command = [sys.executable, "-c", SLEEPER, photo, tmp_path / "out.png"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

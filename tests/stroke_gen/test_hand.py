@@ -83,7 +83,7 @@ def test_pressure_dips_where_a_zigzag_turns():
     (stroke,) = drawn(lines(legs=4))
     middle = stroke.force_n[150]
     assert stroke.force_n[100] == pytest.approx((1 - hand.TURN_DIP) * middle, rel=0.01)
-    assert stroke.force_n[101] == stroke.force_n[100]
+    assert stroke.force_n[101] == stroke.force_n[100] < 0.95 * middle
     assert stroke.force_n[[20, 150, 250]] == pytest.approx([middle] * 3, rel=0.01)
 
 

@@ -59,7 +59,7 @@ class Cluster:
         try:
             distributed: Any = import_module("distributed")
         except ImportError as error:
-            raise ImportError('--dask needs more: pip install "crayonize[cluster]"') from error
+            raise ImportError('--dask needs more: pip install distributed') from error
         for name in (
             "distributed.client",
             "distributed.comm",

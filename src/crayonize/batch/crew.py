@@ -25,6 +25,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from ..machine import cores
 from .job import Job, Outcome
 from .memory import SHARE
 
@@ -171,7 +172,13 @@ class Crew:
         hand = _Hand(process, time.monotonic() + START_LIMIT)
         self._hands.append(hand)
         hand.send({**self.hello, "parent": os.getpid()})
-        threading.Thread(target=self._listen, args=(hand,), daemon=True).start()
+        try:
+            threading.Thread(target=self._listen, args=(hand,), daemon=True).start()
+        except RuntimeError as error:
+            self._dismiss(hand)
+            if not self._hands:
+                raise CrewError(cores.NO_MORE) from error
+            self.size = len(self._hands)
 
     def _listen(self, hand: _Hand) -> None:
         """Reader thread: lines into the inbox, None at the end."""

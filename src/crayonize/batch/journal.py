@@ -6,13 +6,19 @@ so an interrupted run goes on where it was, and a changed photo is drawn anew. A
 over.
 """
 
+import errno
 import json
 import os
 from collections.abc import Iterable
+from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 
+from stroke_gen.files import own_file
+
 from .job import Job
+
+MOST_BYTES = 1 << 28  # about a million pictures
 
 
 class Journal:
@@ -26,17 +32,20 @@ class Journal:
         self._file = path
 
     def _read(self, path: Path) -> None:
-        try:
-            lines = path.read_bytes().split(b"\n")
-        except FileNotFoundError:
+        if not os.path.lexists(path):
             return
-        for line in lines:
-            try:
-                entry = json.loads(line)
-                key = _key(entry["in"], entry["size"], entry["version"], entry["recipe"])
-                self._known[str(entry["out"])] = key, int(entry["bytes"])
-            except (ValueError, KeyError, TypeError, RecursionError):
-                continue
+        with own_file(path, "rb") as file:
+            if os.fstat(file.fileno()).st_size > MOST_BYTES:
+                raise OSError(errno.EFBIG, "is larger than a journal can be; remove it", str(path))
+            for line in file:
+                self._take(line)
+
+    def _take(self, line: bytes) -> None:
+        """Believe a line, if it is a whole one."""
+        with suppress(ValueError, KeyError, TypeError, RecursionError):
+            entry = json.loads(line)
+            key = _key(entry["in"], entry["size"], entry["version"], entry["recipe"])
+            self._known[str(entry["out"])] = key, int(entry["bytes"])
 
     def knows(self, out: str) -> bool:
         """Whether the picture of this name was made here."""
@@ -60,7 +69,7 @@ class Journal:
             "bytes": size,
         }
         line = json.dumps(entry).encode() + b"\n"
-        with open(self._file, "a+b", buffering=0) as file:
+        with own_file(self._file, "a+b") as file:
             if file.seek(0, os.SEEK_END):
                 file.seek(-1, os.SEEK_END)
                 if file.read(1) != b"\n":  # a line torn by a crash

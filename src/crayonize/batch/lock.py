@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+from stroke_gen.files import own_file
+
 
 class Busy(Exception):
     """Another run holds the folder."""
@@ -18,12 +20,12 @@ def held(folder: Path, shard: str | None = None) -> Iterator[None]:
 
     With a shard ("2-of-8") other shards may work beside us, but no run for the whole.
     """
-    with open(folder / "lock", "a+b") as whole:
+    with own_file(folder / "lock", "a+b") as whole:
         _lock(whole, shared=shard is not None)
         if shard is None:
             yield
             return
-        with open(folder / f"lock-{shard}", "a+b") as part:
+        with own_file(folder / f"lock-{shard}", "a+b") as part:
             _lock(part, shared=False)
             yield
 

@@ -2,21 +2,19 @@
 left.
 """
 
+import errno
 import os
-import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
-from stroke_gen.files import PART
+from stroke_gen import files
 
 from . import lock
 from .job import Job
 from .journal import Journal
 
 STATE = ".crayonize"  # folder of journals and locks
-# s after which a temporary file that may belong to another machine is taken for left behind
-_STALE = 3600.0
 
 
 class OutputFolder:
@@ -33,14 +31,20 @@ class OutputFolder:
         there.
         """
         self._state.mkdir(parents=True, exist_ok=True)
+        self._check()
         with lock.held(self._state, self._shard):
             yield
 
     def journal(self) -> Journal:
         """The journals of all runs and shards; we add to our own."""
+        self._check()
         own = self._own_journal()
         others = (file for file in sorted(self._state.glob("journal*.jsonl")) if file != own)
         return Journal(own, others, self._recipe)
+
+    def _check(self) -> None:
+        if self._state.is_symlink():
+            raise OSError(errno.ELOOP, "is a link to another folder; remove it", str(self._state))
 
     def _own_journal(self) -> Path:
         return self._state / (f"journal-{self._shard}.jsonl" if self._shard else "journal.jsonl")
@@ -53,28 +57,16 @@ class OutputFolder:
             return None
 
     def sweep(self, jobs: Iterable[Job]) -> None:
-        """Remove what killed runs left behind; while other shards may be at work, only what is
-        old.
-        """
-        before = time.time() - _STALE if self._shard else None
-        for folder in {os.path.dirname(job.target) for job in jobs}:
-            _remove_parts(folder, PART, before)
+        """Remove what killed runs left behind."""
+        for folder in {str(self._state.parent), *(os.path.dirname(job.target) for job in jobs)}:
+            files.sweep(folder)
 
     def clean_up(self, job: Job, pid: int) -> None:
         """Remove what a worker left behind that was killed at a job."""
-        _remove_parts(os.path.dirname(job.target), f"{PART}{pid}-", None)
+        files.sweep(os.path.dirname(job.target), pid)
 
     def noted(self) -> None:
         """A line was added to the journal."""
 
     def close(self) -> None:
         """The work is done."""
-
-
-def _remove_parts(folder: str, start: str, before: float | None) -> None:
-    with suppress(OSError), os.scandir(folder) as listing:
-        for entry in listing:
-            if entry.name.startswith(start) and ".part" in entry.name:
-                with suppress(OSError):
-                    if before is None or entry.stat().st_mtime < before:
-                        os.unlink(entry.path)

@@ -10,6 +10,7 @@ from .. import api
 from ..images import metadata, page
 from ..images.read import Photo, open_photo
 from ..images.write import read_settings, same_file
+from ..machine import cores
 from ..settings import Settings
 from . import memory
 from .job import Job, Outcome, Recipe
@@ -64,6 +65,8 @@ class Studio:
         except OSError as error:
             return Outcome("failed", f"cannot be read ({error.strerror or error})")
         except Exception as error:  # one photo is never worth the others
+            if cores.is_out_of_threads(error):
+                raise OutputError(cores.NO_MORE) from error
             return Outcome(
                 "failed", f"this should not have happened ({type(error).__name__}: {error})"
             )

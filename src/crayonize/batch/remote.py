@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from stroke_gen.files import is_alive
+
 from .job import Found, Job, Outcome
 from .journal import Journal
 from .output import STATE, OutputFolder
@@ -57,7 +59,7 @@ def file_system(url: str) -> tuple[Any, str]:
     try:
         import fsspec
     except ImportError as error:
-        raise ImportError(f'{url}: remote folders need pip install "crayonize[remote]"') from error
+        raise ImportError(f'{url}: remote folders need pip install fsspec') from error
     system, path = fsspec.core.url_to_fs(url)
     return system, str(path)
 
@@ -190,19 +192,9 @@ class RemoteFolder(OutputFolder):
         """Nothing is left behind there; what is left here by killed runs goes."""
         for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*-*"):
             pid = folder.name[len(_PREFIX) :].partition("-")[0]
-            if pid.isdigit() and not _is_alive(int(pid)):
+            if pid.isdigit() and not is_alive(int(pid)):
                 shutil.rmtree(folder, ignore_errors=True)
 
     def clean_up(self, job: Job, pid: int) -> None:
         """Remove what a killed worker left behind here."""
         remove_copies(pid)
-
-
-def _is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # alive, and somebody else's
-        return True
-    return True

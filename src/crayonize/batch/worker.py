@@ -7,20 +7,19 @@ take.
 """
 
 import contextlib
-import ctypes
 import json
 import os
 import queue
 import signal
-import sys
 import threading
 from typing import IO, Any
 
+from ..machine import cores
+from ..machine.memory import limit_addresses
+from ..machine.parent import die_with
 from .job import Found, Job, Outcome, Recipe
 
-_PR_SET_PDEATHSIG = 1
 _IDLE = 3600.0  # s
-_BUFFERS = 512 << 20  # address space that threads and allocators reserve without using it
 
 Message = dict[str, Any]
 
@@ -71,16 +70,21 @@ def main() -> None:
     """Serve the crew at the other end of stdin and stdout."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     line = _Line()
-    hello = line.open()
-    _die_with(hello["parent"])
+    try:
+        hello = line.open()
+    except RuntimeError:
+        return line.say({"broken": f"a worker cannot start: {cores.NO_MORE}"})
+    die_with(hello["parent"])
     try:
         from .picture import OutputError, Studio
 
         studio = Studio(Recipe.from_json(hello["recipe"]), hello["render"])
-        _limit_memory(hello["memory"])
+        limit_addresses(hello["memory"])
     except ValueError as error:
         return line.say({"refused": str(error)})
     except Exception as error:  # whatever a broken installation raises
+        if cores.is_out_of_threads(error):
+            return line.say({"broken": f"a worker cannot start: {cores.NO_MORE}"})
         return line.say({"broken": f"a worker cannot start: {type(error).__name__}: {error}"})
     line.say({"ready": os.getpid()})
     while True:
@@ -100,28 +104,6 @@ def _message(outcome: Outcome) -> Message:
         "bytes": outcome.bytes,
         "strokes": outcome.strokes,
     }
-
-
-def _die_with(parent: int) -> None:
-    """Let the kernel kill us with our parent (Linux)."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent:
-            os._exit(0)
-
-
-def _limit_memory(most: int | None) -> None:
-    """Let a photo that takes more than all there is end in a MemoryError, not with the machine.
-
-    Set after the libraries are loaded: some crash when they are loaded under a limit.
-    """
-    if most is None or sys.platform != "linux":
-        return
-    import resource
-
-    with open("/proc/self/statm") as file:
-        now = int(file.read().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (now + most + _BUFFERS, resource.RLIM_INFINITY))
 
 
 if __name__ == "__main__":

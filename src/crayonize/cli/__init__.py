@@ -12,13 +12,12 @@ another run holds the folder; 130 Ctrl-C; 143 terminated.
 import atexit
 import gc
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 
 from stroke_gen.checks import printable
 
+from ..machine import cores
 from ..machine.terminal import tell
 from .commands import COMMANDS, convert
 
@@ -29,8 +28,6 @@ def main(words: Sequence[str] | None = None) -> int:
     _fill_streams()
     # what is left at the end goes as a whole; to look through it first takes 0.2 s
     atexit.register(gc.freeze)
-    with suppress(ValueError):  # not in the main thread
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
@@ -74,6 +71,8 @@ def _verdict(error: Exception) -> tuple[int, str]:
     if isinstance(error, OSError):
         name = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
         return 1, f"{name}{error.strerror or error}"
+    if cores.is_out_of_threads(error):
+        return 1, cores.NO_MORE
     return 1, f"this should not have happened ({type(error).__name__}: {error}); -v -v shows where"
 
 

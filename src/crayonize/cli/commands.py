@@ -51,9 +51,9 @@ def convert(words: Sequence[str]) -> int:
     api.check_outputs([photo, *settings.files()], out, options.strokes, options.timelapse)
     if options.out is not None:
         _spare_photo(options.out)
-    from ..images.read import open_photo
+    from ..images.apart import open_apart
 
-    with talk(options) as progress, open_photo(photo) as opened:
+    with talk(options) as progress, open_apart(photo) as opened:
         settings = page.fitted(settings, options.print, options.dpi, opened.width, opened.height)
         with api.filming(
             options.timelapse, options.seconds, options.show_tip, options.light

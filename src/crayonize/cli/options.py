@@ -64,7 +64,7 @@ def _parted(words: Sequence[str]) -> tuple[list[str], list[str]]:
     return list(words[:at]), list(names)
 
 
-_ONLY_WITH = {"seconds": "timelapse", "show_tip": "timelapse", "fit": "print", "margin": "print"}
+_ONLY_WITH = {"seconds": "timelapse", "show_tip": "timelapse"}
 _NOT_WITH = {"size": ("print", "dpi"), "sheet_mm": ("print",)}  # what settles it instead
 
 
@@ -132,7 +132,7 @@ def photo_parser() -> Parser:
         help="what is drawn with most care: auto, none, or a picture of it, white on black (auto)")
     add("--sheet", dest="sheet_mm", type=_sheet, default=Settings.sheet_mm, metavar="SIZE",
         help="long side of the sheet: a5, a4, 180mm; strokes keep their width (a5)")  # fmt: skip
-    add("--print", choices=page.PAGES, help="fill a page of this size")
+    add("--print", type=str.lower, choices=page.PAGES, help="fill a page of this size")
     add("--dpi", type=_dpi, help="pixels to the inch, in place of --size (300 with --print)")
     add(
         "--metadata",
@@ -243,10 +243,11 @@ def _whole(text: str) -> int:
 
 def _sheet(text: str) -> float:
     """Long side in mm of a sheet given by the name of a page or in mm."""
-    if text in page.PAGES:
-        return page.PAGES[text][1]
+    name = text.lower()
+    if name in page.PAGES:
+        return page.PAGES[name][1]
     try:
-        sheet_mm = float(text.removesuffix("mm"))
+        sheet_mm = float(name.removesuffix("mm"))
     except ValueError:
         sheet_mm = 0
     if not 10 <= sheet_mm <= 5000:

@@ -10,6 +10,7 @@ cache folder.
 import hashlib
 import io
 import itertools
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ from ..wax import paper, rub
 from ..wax.box import Box
 from ..wax.physics import physics as physics_of
 from ..wax.sheet import Sheet
-from .palette import Palette
+from .palette import Crayon, Palette
 from .palette_files import load_palette, palette_names
 
 PRESSURES = (0.04, 0.1, 0.2, 0.38, 0.62, 0.95)  # N/mm^2
@@ -34,12 +35,32 @@ TIP = Tip("blunt", TIP_MM)
 SPACING = 0.62  # of the tip's width
 PATCH_MM, EDGE_MM = 11.0, 2.5  # a swatch, and what is left out of the mean around it
 CELL_MM = 297 / 1600
+AT_A_TIME = 32  # crayons on a sheet, which then takes .2 GB
 SHIPPED = Path(__file__).parents[1] / "data" / "tables"
 
 
 def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: int) -> Swatches:
-    """Hatch and measure every crayon of a palette on a paper."""
-    crayons = palette.crayons
+    """Hatch and measure every crayon of a palette on a paper, some at a time on a sheet."""
+    all_ = palette.crayons
+    strips = [
+        _measured(palette, all_[i : i + AT_A_TIME], sheet_paper, physics, threads)
+        for i in range(0, len(all_), AT_A_TIME)
+    ]
+    a, b = (np.concatenate([strip[m] for strip in strips], axis=1) for m in (0, 1))
+    grain = np.concatenate([strip[2] for strip in strips])
+    names = tuple(crayon.name for crayon in all_)
+    base = np.array(paper.colour_linear(sheet_paper.colour), np.float32)
+    return Swatches(names, np.array(PRESSURES, np.float32), a, b, grain, base)
+
+
+def _measured(
+    palette: Palette,
+    crayons: Sequence[Crayon],
+    sheet_paper: paper.Paper,
+    physics: str,
+    threads: int,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Lines a and b (2, k, p, 3) and grain (k, p) of some crayons of a palette."""
     grounds = _grounds(palette)
     rows, cols = len(grounds) * len(PRESSURES), len(crayons)
     shape = (round(rows * PATCH_MM / CELL_MM), round(cols * PATCH_MM / CELL_MM))
@@ -64,12 +85,7 @@ def measure(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: i
     after, grain = _means(optics.render(sheet, base, light=False, threads=threads), rows, cols)
     split = (len(grounds), len(PRESSURES), len(crayons), 3)
     a, b = _fit(before.reshape(split), after.reshape(split))
-    grain = grain.reshape(split[:3])[0].T
-    names = tuple(c.name for c in crayons)
-    paper_colour = np.array(base, np.float32)
-    return Swatches(
-        names, np.array(PRESSURES, np.float32), a, b, np.ascontiguousarray(grain), paper_colour
-    )
+    return a, b, np.ascontiguousarray(grain.reshape(split[:3])[0].T)
 
 
 def _grounds(palette: Palette) -> list[tuple[str, float] | None]:
@@ -140,14 +156,16 @@ def swatches(palette: Palette, sheet_paper: paper.Paper, physics: str, threads: 
     A kept one counts for the version of the wax that it was measured on; a shipped one is of its
     own version.
     """
-    name = f"{palette.name}-{_key(palette, sheet_paper, physics)}.npz"
-    if (SHIPPED / name).is_file():
-        return _unpacked((SHIPPED / name).read_bytes())
-    kept = folder.folder() / f"{source.of_the_wax()}-{name}"
-    content = folder.read(kept)
-    if content is None:
-        content = _packed(measure(palette, sheet_paper, physics, threads))
-        folder.write(kept, content)
+    # Files are named by hashes alone: a palette's name is what a stranger's file says.
+    key = _key(palette, sheet_paper, physics)
+    for shipped in SHIPPED.glob(f"*-{key}.npz"):
+        return _unpacked(shipped.read_bytes())
+    kept = folder.folder() / f"table-{source.of_the_wax()}-{key}.npz"
+    with folder.alone(kept):  # of all that want it now, one measures
+        content = folder.read(kept)
+        if content is None:
+            content = _packed(measure(palette, sheet_paper, physics, threads))
+            folder.write(kept, content)
     return _unpacked(content)
 
 

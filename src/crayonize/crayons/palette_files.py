@@ -71,6 +71,26 @@ def load_palette(source: "str | os.PathLike[str] | dict[str, Any] | Palette") ->
     return _from_file(Path(text), printable(text))
 
 
+def is_file(source: str) -> bool:
+    """Whether a word stands for a file: neither a shipped palette nor a list of colours."""
+    return source not in _shipped() and not source.lstrip().startswith("#")
+
+
+def told(source: str | dict[str, Any]) -> str | dict[str, Any]:
+    """What a drawing says of its palette, so that it can be drawn elsewhere: in place of a file its
+    content.
+    """
+    if isinstance(source, dict) or not is_file(source):
+        return source
+    palette = load_palette(source)
+    path, where = Path(source), printable(source)
+    if path.suffix.lower() == ".json":
+        content: dict[str, Any] = checks.parsed_json(_text_of(path, where), where, "palette")
+        return {"name": palette.name, **content}
+    crayons = [{"name": crayon.name, "hex": crayon.hex} for crayon in palette.crayons]
+    return {"name": palette.name, "crayons": crayons}
+
+
 # ---- reading -------------------------------------------------------------------------------------
 
 

@@ -56,7 +56,7 @@ def check(path: str | os.PathLike[str]) -> None:
         )
     if suffix == ".mp4" and not importlib.util.find_spec("av") and not shutil.which("ffmpeg"):
         raise ValueError(
-            f"{os.fspath(path)!r}: MP4 needs PyAV (pip install 'crayonize[video]') or ffmpeg on "
+            f"{os.fspath(path)!r}: MP4 needs PyAV (pip install av) or ffmpeg on "
             "the PATH; "
             "WebP, GIF and PNG need neither"
         ) from ModuleNotFoundError("av")

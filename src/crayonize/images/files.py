@@ -103,7 +103,7 @@ def _heic(file: IO[bytes]) -> Image.Image:
         import_module("pi_heif").register_heif_opener()
     except ImportError as error:
         raise ValueError(
-            'seems to be a HEIC picture; to read it: pip install "crayonize[heic]"'
+            'seems to be a HEIC picture; to read it: pip install pi-heif'
         ) from error
     try:
         return pillow.opened(file, ("HEIF",))

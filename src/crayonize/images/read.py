@@ -8,6 +8,7 @@ import os
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from typing import IO, Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from .files import Decoded, Stored, identified, of_picture, stored
 from .icc import lineariser
 from .scan import Scan, check_size, scan_array
 
-Source = str | os.PathLike[str] | Image.Image | NDArray[Any]
+Source = str | os.PathLike[str] | Image.Image | NDArray[Any] | bytes
 
 # pixels turned into light at a time: 1.5 MB of float32, which the cache holds
 _STRIP_PIXELS = 1 << 17
@@ -105,6 +106,10 @@ def open_photo(source: Source | Photo) -> Iterator[Photo]:
         with _named("picture"):
             picture = of_picture(source, None)
         yield Photo(source, "picture", picture)
+    elif isinstance(source, bytes):
+        with _named("bytes"):
+            picture = stored(BytesIO(source))
+        yield Photo(source, "bytes", picture)
     else:
         with _named(shown(source)):
             file = _opened(source)

@@ -8,7 +8,7 @@ import json
 import os
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ _EXIF_X_RESOLUTION, _EXIF_Y_RESOLUTION, _EXIF_RESOLUTION_UNIT, _EXIF_INCH = 282,
 
 
 def write_image(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | BinaryIO,
     srgb8: NDArray[np.uint8],
     *,
     settings: Settings | None = None,
@@ -48,13 +48,17 @@ def write_image(
     """Write a picture so that its name never stands for half a file: the old one, the new one, or
     none.
 
-    path: PNG, JPEG, WebP or TIFF by its suffix; a link is replaced, never written through.
+    path: PNG, JPEG, WebP or TIFF by its suffix; a link is replaced, never written through. What is
+        open for writing gets a PNG.
     srgb8: uint8 (h, w, 3), sRGB-encoded. settings: stored inside, see read_settings. dpi: pixels
         per inch on
     paper. quality: 1..100, of JPEG and WebP. kept: tags of the photo, see metadata.py.
     The sRGB profile goes in, no time does.
     ValueError for what the caller can mend; OSError with the path if the disk is full or refuses.
     """
+    if not isinstance(path, str | os.PathLike):
+        path.write(_encode(srgb8, "PNG", "picture", settings or {}, dpi, quality, kept).getbuffer())
+        return
     format_ = file_format(path)
     check_target(path)
     data = _encode(srgb8, format_, shown(path), settings or {}, dpi, quality, kept)

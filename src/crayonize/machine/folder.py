@@ -18,7 +18,9 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from stroke_gen.files import whole_file
+from stroke_gen.files import own_file, read_bytes, whole_file
+
+_LARGEST = 1 << 28  # bytes of an entry
 
 
 def folder() -> Path:
@@ -70,11 +72,24 @@ def _ours(path: Path) -> bool:
 
 def read(path: Path) -> bytes | None:
     """An entry as it was written, or None if it is missing or not whole."""
-    with contextlib.suppress(OSError):
-        content = path.read_bytes()
+    with contextlib.suppress(OSError, ValueError):
+        content = read_bytes(path, _LARGEST, "an entry")
         if hashlib.sha256(content[32:]).digest() == content[:32]:
             return content[32:]
     return None
+
+
+@contextlib.contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """Be the only process at work on an entry, where the system and the folder offer that."""
+    with contextlib.ExitStack() as held:
+        with contextlib.suppress(OSError, ImportError):
+            import fcntl
+
+            path.parent.mkdir(mode=0o700, exist_ok=True)
+            file = held.enter_context(own_file(path.with_suffix(".lock"), "a+b"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def write(path: Path, content: bytes) -> bool:

@@ -4,6 +4,7 @@ any work.
 
 import ctypes
 import math
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -20,6 +21,7 @@ OVERHEAD = 320_000_000  # the libraries, the reduced photo, the planner's work, 
 _DECODING = {"JPEG": 7, "MPO": 7, "PNG": 7, "TIFF": 7, "WEBP": 16, "AVIF": 10, "HEIF": 10}
 _DEEP = 18
 
+_BUFFERS = 512 << 20  # address space that threads and allocators reserve without using it
 _M_ARENA_MAX = -8  # of glibc's malloc.h
 
 
@@ -68,6 +70,24 @@ def share_heaps() -> None:
     """
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, 2)
+
+
+def limit_addresses(most: int | None) -> None:
+    """Let this process take so many bytes more, that what takes too much ends in a MemoryError and
+    not with the machine (Linux).
+
+    To be called after the libraries are loaded: some crash when they are loaded under a limit.
+    """
+    if most is None or sys.platform != "linux":
+        return
+    import resource
+
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    wanted = used + most + _BUFFERS
+    if hard != resource.RLIM_INFINITY:
+        wanted = min(wanted, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
 
 
 def available_bytes() -> int | None:

@@ -80,6 +80,18 @@ def load_paper(spec: "str | dict[str, Any] | Paper") -> Paper:
     )
 
 
+def strange(spec: "str | dict[str, Any]") -> str:
+    """The word of a paper that stands for a file, as it is neither a paper nor a texture of ours;
+    "" if there is none.
+    """
+    if not isinstance(spec, dict):
+        return "" if spec.partition(":#")[0] in papers() else spec
+    texture = spec.get("texture")
+    if texture is not None and texture not in _KINDS:
+        return str(texture)
+    return strange(str(spec.get("name", "drawing")))
+
+
 def _checked(paper: Paper) -> Paper:
     for key in ("name", "title", "texture", "colour"):
         if not isinstance(getattr(paper, key), str):
