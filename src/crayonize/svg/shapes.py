@@ -331,7 +331,7 @@ class _Walk:
     def _colour(self, style: Mapping[str, str], name: str) -> RGB | None:
         """sRGB of a fill or stroke; of a gradient the mean of its stops."""
         text = style.get(name, "none").strip()
-        if text == "currentColor":
+        if text.lower() == "currentcolor":
             text = style.get("color", "black")
         if text.startswith("url("):
             inside, _, otherwise = text[4:].partition(")")
