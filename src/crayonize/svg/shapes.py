@@ -145,11 +145,13 @@ def _fit(root: Element, long_mm: float) -> tuple[float, float, Floats] | None:
 def _size(root: Element, name: str) -> tuple[float, bool] | None:
     """Width or height in mm, and whether in a unit of paper; None if absent or relative."""
     text = root.attributes.get(name, "100%")
+    if text.strip() == "auto":
+        return None
     found = _NUMBER.fullmatch(text.strip())
     unit = found[2].lower() if found else ""
-    if found is None or unit not in (*MM, "", "px", "%", "em", "ex"):
+    if found is None or unit not in (*MM, "", "px", "%", "em", "ex", "rem"):
         raise ValueError(f"{name} is {text[:40]!r}; it must be a length like 210mm")
-    if unit in ("%", "em", "ex"):
+    if unit in ("%", "em", "ex", "rem"):
         return None
     size = float(found[1]) * MM.get(unit, PX_MM)
     if not 0 < size < math.inf:
