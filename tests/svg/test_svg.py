@@ -104,6 +104,11 @@ def test_a_size_that_says_nothing_of_paper_is_as_none(read, size):
     assert (sized.width_mm, sized.height_mm) == (plain.width_mm, plain.height_mm)
 
 
+def test_hsla_is_a_colour(read):
+    line = '<path stroke="hsla(0, 80%, 50%, 0.9)" fill="none" d="M5 5L90 40"/>'
+    assert [s.crayon for s in read(line, palette="box8").strokes] == ["red"]
+
+
 @pytest.mark.parametrize("word", ["currentColor", "currentcolor"])
 def test_the_current_colour_in_any_letters(read, word):
     line = f'<path color="#e02020" stroke="{word}" fill="none" d="M5 5L90 40"/>'

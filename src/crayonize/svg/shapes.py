@@ -56,6 +56,7 @@ _TAKES = {
     "skewX": (1,),
     "skewY": (1,),
 }
+_HSLA = re.compile(r"hsla?\(\s*([0-9.]+\s*,\s*[0-9.]+%\s*,\s*[0-9.]+%)\s*,\s*([0-9.]+)(%?)\s*\)")
 _RGB = re.compile(r"rgba?\(\s*([0-9.]+%?(?:[\s,/]+[0-9.]+%?){2,3})\s*\)")
 _PART = re.compile(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)(%?)")
 
@@ -464,6 +465,10 @@ def _rgba(text: str) -> tuple[float, float, float, float] | None:
         ]
         r, g, b, a = (min(part, 1.0) for part in (*parts, 1.0)[:4])
         return r, g, b, a
+    if found := _HSLA.fullmatch(text):
+        alpha = float(found[2]) / (100 if found[3] else 1)
+        r, g, b = (code / 255 for code in ImageColor.getrgb(f"hsl({found[1]})")[:3])
+        return r, g, b, min(alpha, 1.0)
     try:
         codes = (*ImageColor.getrgb(text), 255)
     except ValueError:
