@@ -96,6 +96,25 @@ def test_file_appears_whole_or_not_at_all(drawing, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("size", ["auto", "2rem", "100%"])
+def test_a_size_that_says_nothing_of_paper_is_as_none(read, size):
+    line = '<path stroke="red" fill="none" d="M5 5L90 40"/>'
+    sized = read(line, head=f'viewBox="0 0 100 50" width="{size}" height="{size}"')
+    plain = read(line)
+    assert (sized.width_mm, sized.height_mm) == (plain.width_mm, plain.height_mm)
+
+
+def test_hsla_is_a_colour(read):
+    line = '<path stroke="hsla(0, 80%, 50%, 0.9)" fill="none" d="M5 5L90 40"/>'
+    assert [s.crayon for s in read(line, palette="box8").strokes] == ["red"]
+
+
+@pytest.mark.parametrize("word", ["currentColor", "currentcolor"])
+def test_the_current_colour_in_any_letters(read, word):
+    line = f'<path color="#e02020" stroke="{word}" fill="none" d="M5 5L90 40"/>'
+    assert [s.crayon for s in read(line, palette="box8").strokes] == ["red"]
+
+
 def test_points_are_left_out_within_the_tolerances():
     """A winding path as densely sampled as the generator's: a tenth of it, and nowhere far off."""
     t = np.linspace(0, 6, 2000)

@@ -56,6 +56,7 @@ _TAKES = {
     "skewX": (1,),
     "skewY": (1,),
 }
+_HSLA = re.compile(r"hsla?\(\s*([0-9.]+\s*,\s*[0-9.]+%\s*,\s*[0-9.]+%)\s*,\s*([0-9.]+)(%?)\s*\)")
 _RGB = re.compile(r"rgba?\(\s*([0-9.]+%?(?:[\s,/]+[0-9.]+%?){2,3})\s*\)")
 _PART = re.compile(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)(%?)")
 
@@ -145,11 +146,13 @@ def _fit(root: Element, long_mm: float) -> tuple[float, float, Floats] | None:
 def _size(root: Element, name: str) -> tuple[float, bool] | None:
     """Width or height in mm, and whether in a unit of paper; None if absent or relative."""
     text = root.attributes.get(name, "100%")
+    if text.strip() == "auto":
+        return None
     found = _NUMBER.fullmatch(text.strip())
     unit = found[2].lower() if found else ""
-    if found is None or unit not in (*MM, "", "px", "%", "em", "ex"):
+    if found is None or unit not in (*MM, "", "px", "%", "em", "ex", "rem"):
         raise ValueError(f"{name} is {text[:40]!r}; it must be a length like 210mm")
-    if unit in ("%", "em", "ex"):
+    if unit in ("%", "em", "ex", "rem"):
         return None
     size = float(found[1]) * MM.get(unit, PX_MM)
     if not 0 < size < math.inf:
@@ -331,7 +334,7 @@ class _Walk:
     def _colour(self, style: Mapping[str, str], name: str) -> RGB | None:
         """sRGB of a fill or stroke; of a gradient the mean of its stops."""
         text = style.get(name, "none").strip()
-        if text == "currentColor":
+        if text.lower() == "currentcolor":
             text = style.get("color", "black")
         if text.startswith("url("):
             inside, _, otherwise = text[4:].partition(")")
@@ -462,6 +465,10 @@ def _rgba(text: str) -> tuple[float, float, float, float] | None:
         ]
         r, g, b, a = (min(part, 1.0) for part in (*parts, 1.0)[:4])
         return r, g, b, a
+    if found := _HSLA.fullmatch(text):
+        alpha = float(found[2]) / (100 if found[3] else 1)
+        r, g, b = (code / 255 for code in ImageColor.getrgb(f"hsl({found[1]})")[:3])
+        return r, g, b, min(alpha, 1.0)
     try:
         codes = (*ImageColor.getrgb(text), 255)
     except ValueError:
