@@ -65,3 +65,9 @@ def times(vectors: NDArray[np.floating], matrix: NDArray[np.floating]) -> NDArra
 def norm(vector: NDArray[np.floating]) -> float:
     """The length of one vector (n,), without BLAS."""
     return float(np.sqrt((vector * vector).sum()))
+
+
+# The guided filter keeps for good the road that it took first.
+with plain_opencv():
+    _any = np.zeros((4, 4), np.float32)
+    cv2.ximgproc.guidedFilter(_any, _any, 1, 1.0)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .alike import times
+from .alike import plain_opencv, times
 
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
@@ -51,12 +51,14 @@ def available() -> bool:
 
 
 @cache
+@plain_opencv()  # layers keep the road that was open when they were made
 def _network(name: str) -> Any:
     # OpenCV 5's new engine loses all outputs but one; OpenCV 4 has only the classic one.
     engine = [cv2.dnn.ENGINE_CLASSIC] if hasattr(cv2.dnn, "ENGINE_CLASSIC") else []
     return cv2.dnn.readNetFromTFLite(str(MODELS / f"{name}.tflite"), *engine)
 
 
+@plain_opencv()
 def _run(name: str, picture: Floats, *outputs: str) -> Sequence[Floats]:
     """The outputs of a network for a picture (side, side, 3).
 

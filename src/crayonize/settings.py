@@ -50,6 +50,7 @@ class Choices(TypedDict, total=False):
     age: int | None
     left_handed: bool
     focus: tuple[tuple[float, float, float, float], ...]
+    subject: str | NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def test_a_folder_gives_the_pictures_that_single_photos_give(photos: Path, tmp_p
     assert lines[-1]["counts"] | {"ok": 3, "failed": 1} == lines[-1]["counts"]
     assert "broken.jpg" in err
     assert all(line["strokes"] > 100 for line in lines[:-1] if line["status"] == "ok")
-    alone = crayonize(photos / "p2.jpg", tmp_path / "alone.png", *SMALL)
+    alone = crayonize(photos / "p2.jpg", tmp_path / "alone.png", "-q", *SMALL)
     assert alone.communicate(timeout=300)[1] == ""
     assert (tmp_path / "all" / "p2.png").read_bytes() == (tmp_path / "alone.png").read_bytes()
     with Image.open(tmp_path / "alone.png") as picture:

@@ -222,7 +222,7 @@ def test_mp4_by_ffmpeg(scribble, tmp_path, monkeypatch):
 def test_mp4_without_its_packages_names_them(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.setattr(film.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(ValueError, match=r"crayonize\[video\].*ffmpeg") as caught:
+    with pytest.raises(ValueError, match=r"pip install av.*ffmpeg") as caught:
         Timelapse(tmp_path / "film.mp4")
     assert isinstance(caught.value.__cause__, ImportError)
 

@@ -645,7 +645,7 @@ def test_an_even_film_stays_even(bench, monkeypatch, cell_mm, um):
     loose_strong, loose_alike = grain(bench.changed(yields=0.0))
     assert strong < (0.075 if um == 10 else 0.065)
     assert strong < (0.9 if um == 10 else 0.75) * loose_strong
-    assert alike > loose_alike + 0.05, "without yielding every other cell is high"
+    assert alike > loose_alike + 0.03, "without yielding every other cell is high"
 
 
 def test_nothing_is_pressed_harder_than_wax_bears(bench):
