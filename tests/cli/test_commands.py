@@ -425,7 +425,11 @@ def test_closed_pipe_is_quiet():
 
 
 SLEEPER = """
-import sys, time
+import signal, sys, time
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # inherited, where tests run as a job
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 from crayonize import __main__, api
 from crayonize.cli import bar
 from crayonize.cli.options import photo_parser

@@ -40,6 +40,29 @@ def test_another_processor_draws_the_same_picture():
     assert {name: drawn(more) for name, more in OTHERS.items()} == dict.fromkeys(OTHERS, usual)
 
 
+GUIDED = """
+import hashlib
+import cv2, numpy as np
+from stroke_gen.alike import plain_opencv
+picture = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
+for road in {roads}:
+    cv2.setUseOptimized(road)
+    smooth = cv2.ximgproc.guidedFilter(picture, picture[..., 0].copy(), 4, 1e-3)
+print(hashlib.md5(smooth.tobytes()).hexdigest())
+"""
+
+
+def test_what_ran_before_in_a_process_changes_nothing():
+    """The guided filter decides once for all how it calculates."""
+    sums = {
+        subprocess.run(
+            [sys.executable, "-c", GUIDED.format(roads=roads)], capture_output=True, text=True
+        ).stdout
+        for roads in ((False,), (True, False))
+    }
+    assert len(sums) == 1 and len(sums.pop()) == 33
+
+
 def test_opencv_is_given_back_as_it_was():
     assert cv2.useOptimized()
     with plain_opencv():
