@@ -28,7 +28,7 @@ _PARSED = {  # what is kept -> the choices that it comes from
 }
 
 
-SUBJECTS = "auto", "none"
+SUBJECTS = "auto", "none"  # words for a subject; anything else is a picture of it
 MASK_SIDE = 1000  # pixels of the picture of a subject that are looked at
 # What can be drawn with, and its constants in data/physics.toml.
 MEDIA = {"crayon": "metric", "oil-pastel": "oil-pastel", "pencil": "pencil"}
@@ -50,7 +50,7 @@ class Choices(TypedDict, total=False):
     age: int | None
     left_handed: bool
     focus: tuple[tuple[float, float, float, float], ...]
-    subject: str | NDArray[Any]
+    subject: str | os.PathLike[str] | NDArray[Any]
 
 
 @dataclass(frozen=True)
